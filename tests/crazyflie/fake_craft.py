@@ -19,16 +19,18 @@ class FakeCraft:
     """See `airtouch.crazyflie.flight.Craft`."""
 
     def __init__(self, loss=0.0, silent=(), volts=4.0, busy=False, dead_link_at=None, restart_at=None,
-                 platform=(1.0, 2.0), seed=1, uptime_s=0):
+                 platform=(1.0, 2.0), seed=1, uptime_s=0, falls=True, mute=False):
         self.samples, self.answers, self.lost = queue.SimpleQueue(), queue.SimpleQueue(), threading.Event()
         self.uptime_ms = 1000 * uptime_s  #: that its clock shows at the start
         self.loss, self.silent, self.volts, self.busy = loss, silent, volts, busy
         self.dead_link_at, self.restart_at, self.platform = dead_link_at, restart_at, platform
+        self.falls = falls  #: at restart_at; otherwise only its clock starts again
+        self.mute = mute  #: from restart_at on it sends no state
         self.heard: list = []  #: commands that reached it: (drone's clock, command)
         self.random = random.Random(seed)
         self.state, self.leg = PLAN_IDLE, None
         self.at = [0.0, 0.0, 0.0]
-        self.crashed = False
+        self.crashed, self.restarted = False, False
         self.reopened = 0
         self.now, self._next = 0.0, 0
 
@@ -114,6 +116,9 @@ class FakeCraft:
         stamp = self.uptime_ms + index * 10
         if self.restart_at is not None and t > self.restart_at:
             stamp = int((t - self.restart_at) * 1000)
+            if self.falls and not self.restarted:
+                self.state, self.leg, self.at = PLAN_IDLE, None, [self.at[0], self.at[1], 0.0]
+            self.restarted = True
         over = self.platform[0] <= self.at[0] <= self.platform[1]
         down = max(self.at[2] - (PLATFORM_M if over else 0.0), 0.01)
         pwm = FLYING_PWM if self.flying else 0
@@ -122,8 +127,8 @@ class FakeCraft:
                   "pm.vbat": self.volts - 0.3 * self.flying}
         values |= {f"motor.m{i}": pwm for i in range(1, 5)}
         self.samples.put(Sample(blocks.MOTION.name, stamp % (1 << 24), self.now, values))
-        if index % 5 == 0:
+        if index % 5 == 0 and not (self.mute and self.restarted):
             slow = {name: 0 for name in blocks.STATE.names}
             slow |= {f"stateEstimateZ.{a}": int(1000 * v) for a, v in zip("xyz", self.at, strict=True)}
-            slow |= {"stateEstimateZ.quat": 3 << 30, "supervisor.info": 0b11111}
+            slow |= {"stateEstimateZ.quat": 3 << 30, "supervisor.info": 0b1111 | self.flying << 4}
             self.samples.put(Sample(blocks.STATE.name, stamp % (1 << 24), self.now, slow))

@@ -154,6 +154,22 @@ def test_a_drone_that_restarts_in_flight_ends_it(tmp_path, uptime_h):
     assert "land" not in kinds(craft)
 
 
+@pytest.mark.parametrize("restart_at", [4.0, 9.0, 17.0])
+def test_a_drone_that_flies_on_while_its_clock_jumps_is_landed(tmp_path, restart_at):
+    craft, calls = FakeCraft(restart_at=restart_at, falls=False), []
+    flight, book, ended = fly(craft, tmp_path, in_air=calls.append)
+    assert ended == "the drone's clock jumped" and not craft.flying and not craft.crashed and flight.landed
+    assert [k for k in kinds(craft) if k != "go"][1:3] == ["land", "stop"]
+    assert calls[-1] is False and book.finish()["t_s"][-1] == pytest.approx(restart_at, abs=0.02)
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_a_drone_that_does_not_say_whether_it_flies_is_left_to_the_guard(tmp_path, falls):
+    craft, calls = FakeCraft(restart_at=9.0, falls=falls, mute=True), []
+    flight, _, ended = fly(craft, tmp_path, in_air=calls.append)
+    assert "land it by hand" in ended and "land" not in kinds(craft) and calls[-1] is True and not flight.landed
+
+
 def test_an_error_of_ours_lands_first(tmp_path):
     craft = FakeCraft()
 

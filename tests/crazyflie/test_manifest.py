@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from airtouch.crazyflie import manifest
+from airtouch.crazyflie.collect import prepare_folder
+from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps"
@@ -61,3 +63,16 @@ def test_columns_of_the_user_stay_where_they_are(tmp_path):
 def test_a_recorded_flight_without_mission_leaves_its_values_empty(tmp_path):
     manifest.list_flight(tmp_path / "a.csv", flight(), planned=True)
     assert (tmp_path / "manifest.csv").read_text() == f"{HEADER}\na.csv,clean,0,,,none,\n"
+
+
+@pytest.mark.parametrize("content, message", [
+    ("file,use,note\na.csv,clean,Gerät\n".encode("latin-1"), "manifest.csv: no text in UTF-8"),
+    (b"file,use\na.csv,clean\nb.csv,clean,windy, from the left\n", "manifest.csv:3: more cells than columns"),
+])
+def test_a_manifest_to_which_no_flight_can_be_added_is_refused_before_the_take_off(tmp_path, content, message):
+    (tmp_path / "manifest.csv").write_bytes(content)
+    with pytest.raises(AirTouchError, match=message):
+        prepare_folder(tmp_path, lambda _: None)
+    with pytest.raises(AirTouchError, match=message):
+        manifest.list_flight(tmp_path / "new.csv", flight(), planned=True)
+    assert (tmp_path / "manifest.csv").read_bytes() == content

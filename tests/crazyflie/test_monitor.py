@@ -1,7 +1,6 @@
 """The board behind `monitor`: edges from packets, with and without losses, and from the app's counter."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,7 +86,7 @@ def test_edges_are_felt_where_the_log_feels_them(flight):
 
 
 def test_losses_move_them_little_for_the_clock_stays_true(flight, monkeypatch):
-    monkeypatch.setattr("airtouch.crazyflie.monitor.time", SimpleNamespace(monotonic=lambda: 5.0))
+    monkeypatch.setattr("airtouch.crazyflie.monitor.host_clock_s", lambda: 5.0)
     complete, holed = watch(flight), watch(flight, loss=0.3)
     assert holed.detector.taken == pytest.approx(len(flight), abs=8)
     assert [f.kind for f in holed.board.edges] == [f.kind for f in complete.board.edges]

@@ -47,6 +47,22 @@ def test_a_damaged_file_in_the_target_is_replaced(two_flights, tmp_path):
     assert "b.csv.gz" in public.fetch(out, source=source)["new"]
 
 
+def test_a_file_of_the_same_name_with_other_content_stays_without_force(two_flights, tmp_path):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    out.mkdir()
+    for name, data in two_flights.items():
+        (source / name.removesuffix(".gz")).write_bytes(data)
+    mine = gzip.compress(b"mine\n")
+    (out / "b.csv.gz").write_bytes(mine)
+    arguments = ["--from", str(source), "--out", str(out)]
+    refused = CliRunner().invoke(fetch, arguments).exception
+    assert isinstance(refused, AirTouchError) and "b.csv.gz" in str(refused) and "--force" in str(refused)
+    assert [p.name for p in out.iterdir()] == ["b.csv.gz"] and (out / "b.csv.gz").read_bytes() == mine
+    assert CliRunner().invoke(fetch, [*arguments, "--force"]).exit_code == 0
+    assert gzip.decompress((out / "b.csv.gz").read_bytes()) == two_flights["b.csv.gz"]
+
+
 def test_a_manifest_of_other_flights_stays(two_flights, tmp_path):
     source, out = tmp_path / "source", tmp_path / "out"
     source.mkdir()

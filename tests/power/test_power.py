@@ -84,6 +84,18 @@ def test_any_order_unit_and_separator(header, row, expected):
     assert power.mw == pytest.approx(expected) and power.seconds == pytest.approx(2.495)
 
 
+@pytest.mark.parametrize("header", ["time_ms,bus_power_mW,bus_V,current_mA", "time_ms,current_V,bus_V,current_mA",
+                                    "time_ms,Bus Power (W),Bus Voltage (V),Current (mA)"])
+def test_a_column_with_the_unit_of_another_quantity_is_not_taken(header):
+    trace = ina219.parse(header + "\n" + "".join(f"{k},{1.5},3.8,20\n" for k in range(50)), "x.csv")
+    assert (trace.volts == 3.8).all() and trace.amperes == pytest.approx(0.02)
+
+
+def test_a_log_of_power_alone_is_refused():
+    with pytest.raises(AirTouchError, match="no column for volts"):
+        ina219.parse("time_ms,bus_power_mW,current_mA\n1,2,3\n2,2,3\n", "x.csv")
+
+
 def test_damaged_lines_are_passed_over_and_told():
     lines = text(*constant(2.0)).splitlines()
     lines[50], lines[60], lines[70] = "250,3.8", "300,3x8,20,", "350,99,20,"

@@ -26,7 +26,7 @@ from patience import HANG_S
 
 URI = "simulated://"
 CLOCKED = [f"airtouch.crazyflie.{name}" for name in (
-    "readiness", "connection.drone", "flight", "connection.log_blocks", "monitor")]
+    "readiness", "connection.drone", "flight", "connection.log_blocks", "connection.ticks", "monitor")]
 CLOCKED += ["cflib.crazyflie.link_statistics", "cflib.positioning.motion_commander"]
 LOOK_S = 0.0002
 CREATE, APPEND, SETTINGS = 6, 7, 1
@@ -50,6 +50,10 @@ class Clock:
         return self._now
 
     time = monotonic
+
+    def clock_gettime(self, clock: int) -> float:
+        """The drone's time, s, whichever clock of the system is asked for."""
+        return self.monotonic()
 
     def at(self, due_s: float, action: Callable[[], None]) -> None:
         """Call `action` when it is that late."""

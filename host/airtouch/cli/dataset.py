@@ -22,7 +22,8 @@ def command() -> None:
 @click.option("--from", "source", type=click.Path(path_type=Path),
               help="Take the files from this folder instead of the network.")
 @click.option("--base-url", default=public.BASE_URL, show_default=False, help="Another mirror of the CSV files.")
-def fetch(out: Path, source: Path | None, base_url: str) -> None:
+@click.option("--force", is_flag=True, help="Replace files of the same name with other content.")
+def fetch(out: Path, source: Path | None, base_url: str, force: bool) -> None:
     """Fetch the paper's authors' flights, with their manifest.
 
     \b
@@ -31,14 +32,14 @@ def fetch(out: Path, source: Path | None, base_url: str) -> None:
     airtouch crossval flights/airtouch
     """
     with no_empty_folders(out):
-        _fetch(out, source, base_url)
+        _fetch(out, source, base_url, force)
 
 
-def _fetch(out: Path, source: Path | None, base_url: str) -> None:
+def _fetch(out: Path, source: Path | None, base_url: str, force: bool) -> None:
     """Fetch the flights and print their numbers. Raises AirTouchError where some failed."""
     with Progress(transient=True) as bar:
         task = bar.add_task("flights", total=len(public.registry()))
-        states = public.fetch(out, source=source, base_url=base_url,
+        states = public.fetch(out, source=source, base_url=base_url, force=force,
                               progress=lambda name, state: bar.update(task, advance=1, description=name))
     click.echo(f"{out}: {len(states['new'])} new, {len(states['present'])} already there, "
                f"{len(states['failed'])} failed")

@@ -26,6 +26,7 @@ from airtouch.crazyflie.mission import LANDING_MPS, Mission
 from airtouch.crazyflie.readiness import Readiness, origin_of, settle
 from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder, flight_path
 from airtouch.errors import AirTouchError
+from airtouch.logs.files import MANIFEST
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import DEFAULT_VEHICLE
 
@@ -64,9 +65,10 @@ class Outcome:
 
 
 def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
-    """Make the folder for flights, check its free space, and recover the flights of a killed run.
+    """Make the folder for flights, check its free space and manifest, and recover the flights of a killed run.
 
-    Raises AirTouchError for a folder that cannot be made or written to, or that is too full.
+    Raises AirTouchError for a folder that cannot be made or written to, or that is too full, and for a manifest to
+    which no flight can be added.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -78,6 +80,7 @@ def prepare_folder(out: Path, say: Callable[[str], None]) -> None:
     if free < LEAST_FREE_BYTES:
         raise AirTouchError(f"{out}: {free / 2**20:.0f} MB of room left, "
                             f"{LEAST_FREE_BYTES / 2**20:.0f} are needed")
+    manifest.read(out / MANIFEST)
     recovered, unreadable = manifest.recover(out)
     for path in recovered:
         say(f"{path}: recovered from a flight whose process was killed")

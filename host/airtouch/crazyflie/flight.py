@@ -16,7 +16,8 @@ from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.connection.drone import drain
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample
-from airtouch.crazyflie.connection.ticks import Restarted
+from airtouch.crazyflie.connection.ticks import Restarted, host_clock_s
+from airtouch.crazyflie.readiness import FLYING
 from airtouch.crazyflie.recorder import Recorder
 from airtouch.errors import AirTouchError
 
@@ -77,7 +78,7 @@ class Flight:
     link_timeout_s: float = LINK_TIMEOUT_S
     show: Callable[["Flight"], None] = lambda _: None
     say: Callable[[str], None] = lambda _: None
-    clock: Callable[[], float] = field(default_factory=lambda: time.monotonic)
+    clock: Callable[[], float] = field(default_factory=lambda: host_clock_s)
     sleep: Callable[[float], None] = field(default_factory=lambda: time.sleep)
     in_air: Callable[[bool], None] = lambda _: None
     silences: list[float] = field(default_factory=list)
@@ -87,6 +88,8 @@ class Flight:
     _began: float = 0.0
     _last_ping: float = 0.0
     _landing_since: float | None = None
+    _restarted_s: float | None = None  #: host's clock when the drone's started again, until it says whether it flies
+    _logs: bool = True
 
     def run(self) -> str:
         """Fly to the end. Returns "as planned", or the reason of an early landing."""
@@ -111,9 +114,12 @@ class Flight:
         The order matters: a reason to land is found before the autopilot's step, so that the landing is in it, and
         the link is repaired before anything is sent.
         """
-        if not self._receive():
-            return self._over("the drone restarted in flight")
+        self._receive()
         silence = self._silence(wall)
+        if self._restarted_s is not None and not self._flies_on(wall):
+            self._repair_link(silence)
+            self._ping(wall)
+            return self._after_restart(wall)
         for kind, code in drain(self.craft.answers):
             self.pilot.answer(kind, code)
         self._land_early(wall, silence)
@@ -122,6 +128,29 @@ class Flight:
         self._ping(wall)
         if self._landing_since is not None and self.pilot.waiting and wall - self._landing_since > GIVE_UP_S:
             return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
+        return None
+
+    def _flies_on(self, wall: float) -> bool:
+        """True if a drone whose clock started again says that it flies; it then lands.
+
+        Only its own word counts: a landing that is sent to a drone that fell would spin its motors.
+        """
+        if not self.pilot.in_air or self.intake.supervisor is None or not self.intake.supervisor & FLYING:
+            return False
+        self._restarted_s = None
+        self._land_for("the drone's clock jumped", wall)
+        return True
+
+    def _after_restart(self, wall: float) -> str | None:
+        """How the flight ended after a restart; None while the drone has not said yet whether it flies.
+
+        Without its word the guard stays armed. Firmware that never says it counts as restarted.
+        """
+        says = self.intake.slow is not None and "supervisor.info" in self.intake.slow.names
+        if not self.pilot.in_air or not says or self.intake.supervisor is not None:
+            return self._over("the drone restarted in flight")
+        if wall - (self._restarted_s or wall) > self.link_timeout_s:
+            return "the drone's clock jumped, and it does not tell whether it flies; land it by hand"
         return None
 
     def _send(self, commands: list[Command]) -> None:
@@ -135,7 +164,11 @@ class Flight:
     def _land_early(self, wall: float, silence: float) -> None:
         """Turn the mission into a landing where there is a reason to land."""
         reason = self._reason(silence)
-        if reason and self.pilot.phase == "mission":
+        if reason:
+            self._land_for(reason, wall)
+
+    def _land_for(self, reason: str, wall: float) -> None:
+        if self.pilot.phase == "mission":
             self._tell(f"{reason}: landing")
             self.pilot.land(reason)
             self._landing_since = wall
@@ -165,16 +198,18 @@ class Flight:
         self.landed = True
         self.in_air(False)
 
-    def _receive(self) -> bool:
-        """Handle the received packets. False if the drone restarted."""
+    def _receive(self) -> None:
+        """Handle the received packets. The log ends where the drone's clock starts again."""
         try:
             times, columns = self.intake.take(drain(self.craft.samples))
         except Restarted:
-            return False
-        if len(times):
+            self.intake = Intake(self.intake.slow, last_arrival_s=self.intake.last_arrival_s)
+            self._restarted_s, self._logs = self.clock(), False
+            return
+        if len(times) and self._logs:
             self.recorder.add(times, columns)
+        if len(times):
             self._volts.extend(columns["vbat_V"])
-        return True
 
     def _silence(self, wall: float) -> float:
         """Seconds since the last packet, or since the flight began; notes each silence of over SILENCE_S."""

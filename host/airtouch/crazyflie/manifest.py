@@ -7,8 +7,9 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.crazyflie import recorder
+from airtouch.errors import AirTouchError
 from airtouch.logs.edges import true_edges
-from airtouch.logs.files import MANIFEST, write_bytes
+from airtouch.logs.files import MANIFEST, read_text, write_bytes
 from airtouch.logs.flight_log import FlightLog
 
 COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
@@ -23,7 +24,7 @@ def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
     """
     path = file.parent / MANIFEST
     use = use_of(log, planned)
-    names, rows = _rows(path)
+    names, rows = read(path)
     names += [name for name in COLUMNS if name not in names]
     rows = [row for row in rows if row.get("file") != file.name]
     rows.append(_row(file.name, use, log))
@@ -60,14 +61,21 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
     return recovered, unreadable
 
 
-def _rows(path: Path) -> tuple[list[str], list[dict[str, Any]]]:
-    """Names of the columns, and rows, of a manifest; none of both without one."""
+def read(path: Path) -> tuple[list[str], list[dict[str, Any]]]:
+    """Names of the columns, and rows, of a manifest; none of both without one.
+
+    Raises AirTouchError for one that is no text in UTF-8 or has a row with more cells than columns.
+    """
     if not path.is_file():
         return [], []
-    with path.open(encoding="utf-8-sig", newline="") as handle:
-        reader = csv.DictReader(handle)
-        rows = list(reader)
-        return list(reader.fieldnames or []), rows
+    reader = csv.DictReader(io.StringIO(read_text(path).removeprefix("\ufeff"), newline=""))
+    rows = []
+    for row in reader:
+        if None in row:
+            raise AirTouchError(f"{path}:{reader.line_num}: more cells than columns; put a cell that has a comma in "
+                                "quotes")
+        rows.append(row)
+    return list(reader.fieldnames or []), rows
 
 
 def _row(name: str, use: str, log: FlightLog) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from airtouch.crazyflie.connection import app_log, blocks
 from airtouch.crazyflie.connection.drone import Drone, drain
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample
-from airtouch.crazyflie.connection.ticks import Restarted
+from airtouch.crazyflie.connection.ticks import Restarted, host_clock_s
 from airtouch.crazyflie.flight import FORGOTTEN_S
 from airtouch.crazyflie.view.board import Board, Link, ReportedEdge
 from airtouch.crazyflie.view.host_detector import HostDetector, with_gaps
@@ -65,7 +65,7 @@ class Monitor:
         if not len(clock):
             return
         self._before_ms = int(clock[-1])
-        self._arrivals += [(time.monotonic(), len(times))]
+        self._arrivals += [(host_clock_s(), len(times))]
         seconds = (clock - self.intake.first_ms) / 1000.0
         edges = []
         if self.detector:
@@ -95,7 +95,7 @@ class Monitor:
 
     def refresh(self, round_trip_s: float) -> None:
         """Update the state of the link on the board."""
-        now = time.monotonic()
+        now = host_clock_s()
         while self._arrivals and now - self._arrivals[0][0] > RATE_S:
             self._arrivals.popleft()
         span = now - self._arrivals[0][0] if self._arrivals else 0.0
@@ -109,13 +109,13 @@ class Monitor:
 def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
           show: Callable[[Board], None], say: Callable[[str], None]) -> None:
     """Update and show the board for `duration_s`, or until `stop` is set. A lost link is opened again."""
-    until = time.monotonic() + duration_s if duration_s else float("inf")
+    until = host_clock_s() + duration_s if duration_s else float("inf")
     pinged = 0.0
-    while time.monotonic() < until and not stop.is_set():
+    while host_clock_s() < until and not stop.is_set():
         if drone.lost.is_set():
             say("the link broke; connecting anew")
             try:
-                drone.reopen(min(REOPEN_S, max(until - time.monotonic(), 0.1)))
+                drone.reopen(min(REOPEN_S, max(until - host_clock_s(), 0.1)))
             except AirTouchError:
                 continue
         try:
@@ -125,11 +125,11 @@ def watch(drone: Drone, monitor: Monitor, duration_s: float | None, stop: Event,
             monitor.restart()
             continue
         heard = monitor.intake.last_arrival_s
-        if heard is not None and time.monotonic() - heard > FORGOTTEN_S:
+        if heard is not None and host_clock_s() - heard > FORGOTTEN_S:
             drone.revive()
-        if time.monotonic() - pinged > PING_S:
+        if host_clock_s() - pinged > PING_S:
             drone.ping()
-            pinged = time.monotonic()
+            pinged = host_clock_s()
         for line in drone.console_lines():
             say(f"the drone says: {line}")
         monitor.refresh(drone.round_trip_s)

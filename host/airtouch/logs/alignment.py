@@ -1,6 +1,7 @@
 """Signals with different sample times, aligned to one clock of 100 Hz."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,12 @@ HOLD_BATTERY_S = 5.0  #: s, the same of the battery, which is often logged at 1 
 Signal = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)
 
 
-def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> FlightLog:
+def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, Any]) -> FlightLog:
     """The flight log at 100 Hz of signals {column: (times, values)}.
 
     Accelerations and rates that were sampled faster than 100 Hz are averaged over each 10 ms. Any other signal repeats
     its last value for at most HOLD_S, the battery for HOLD_BATTERY_S. The clock starts with the first acceleration or
-    rate. Raises AirTouchError if there is neither.
+    rate. A column without a value in its time gives a warning. Raises AirTouchError if there is neither.
     """
     signals = {name: _sorted(*signal) for name, signal in signals.items() if len(signal[0])}
     imu_times = [signals[name][0] for name in (*GYRO, *ACC) if name in signals]
@@ -33,7 +34,9 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, object]) -> Fl
         fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * SAMPLE_PERIOD_S if len(times) > 1 else False
         hold_s = HOLD_BATTERY_S if name == "vbat_V" else HOLD_S
         columns[name] = _average(times, values, clock) if fast else _hold(times, values, clock, hold_s)
-    return FlightLog(columns, {"condition": "", "warnings": [], **meta})
+    empty = [f"{name} is empty: no value while the IMU was logged" for name, values in columns.items()
+             if not np.isfinite(values).any()]
+    return FlightLog(columns, {"condition": "", **meta, "warnings": [*meta.get("warnings", []), *empty]})
 
 
 def _sorted(times: np.ndarray, values: np.ndarray) -> Signal:

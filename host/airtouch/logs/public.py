@@ -24,24 +24,28 @@ def registry() -> list[dict[str, str]]:
 
 
 def fetch(
-    out: Path, *, source: Path | None = None, base_url: str = BASE_URL, progress: Progress | None = None
+    out: Path, *, source: Path | None = None, base_url: str = BASE_URL, force: bool = False,
+    progress: Progress | None = None
 ) -> dict[str, list[str]]:
     """Write the flights as `.csv.gz`, and their manifest.csv, to the folder `out`.
 
     source: a folder to copy them from (`.csv` or `.csv.gz`) instead of a download.
+    force: replace files of these names that hold something else; damaged ones are replaced in any case.
     progress: called with (file, state) after each flight.
 
     Returns the file names by state: "present" (already there with the right hash), "new" and "failed"
     (missing at the source, or with a wrong hash; not written).
     No manifest.csv is written where there is no flight.
-    Raises AirTouchError if `source` is no folder, if `out` has a manifest.csv of other flights, and if pooch is needed
-    and not installed.
+    Raises AirTouchError if `source` is no folder, if `out` has a manifest.csv of other flights or, without `force`, a
+    file of the same name with other content, and if pooch is needed and not installed.
     """
     if source is not None and not source.is_dir():
         raise AirTouchError(f"{source}: no such folder; --from takes the folder that holds the CSV files")
     read = from_folder(source) if source is not None else _from_network(base_url)
     make_folder(out)
     _check_manifest(out / MANIFEST)
+    if not force:
+        _check_others(out)
     states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
     for row in registry():
         target = out / row["file"]
@@ -121,6 +125,19 @@ def _check_manifest(path: Path) -> None:
     lines = load_bytes(path).decode(errors="replace").splitlines() if path.exists() else []
     if not {*lines} <= {*_manifest_lines().values()}:
         raise AirTouchError(f"{path}: not the manifest of these flights; choose another --out, or move it away")
+
+
+def _check_others(out: Path) -> None:
+    """Raise AirTouchError for a file that has a flight's name, can be read, and is not that flight."""
+    for row in registry():
+        target = out / row["file"]
+        try:
+            content = load_bytes(target)
+        except AirTouchError:
+            continue
+        if hashlib.sha256(content).hexdigest() != row["sha256"]:
+            raise AirTouchError(f"{target}: another content than the published flight; use --force to replace it, or "
+                                "choose another --out")
 
 
 def _write_manifest(path: Path, present: set[str]) -> None:

@@ -17,6 +17,8 @@ UNITS = {"ms": 1e-3, "us": 1e-6, "s": 1.0, "mv": 1e-3, "v": 1.0, "ma": 1e-3, "ua
 QUANTITIES = {"time": ("time", "t", "millis", "timestamp"),
               "volts": ("bus", "voltage", "volts", "volt", "v", "u"),
               "amperes": ("current", "amperes", "i"), "stage": ("stage", "phase", "module")}
+UNITS_OF = {"time": ("ms", "us", "s"), "volts": ("mv", "v"), "amperes": ("ma", "ua", "a")}
+OTHER_UNITS = ("mw", "uw", "w", "mj", "j", "mah", "ah", "mwh", "wh", "ohm", "ohms", "hz", "c")
 MEASURED = ("time", "volts", "amperes")
 #: factor to seconds of a time column whose name says no unit; other columns are SI
 FACTORS = {"millis": 1e-3, "timestamp": 1.0, "time": 1.0, "t": 1.0}
@@ -113,7 +115,7 @@ def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, 
         words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
         unit = next((w for w in words[1:][::-1] if w in UNITS), None)
         for quantity, known in QUANTITIES.items():
-            if quantity not in columns and words and words[0] in known:
+            if quantity not in columns and words and words[0] in known and not _other_unit(quantity, words[1:]):
                 columns[quantity] = (at, UNITS[unit] if unit else FACTORS.get(words[0], 1.0))
                 break
     missing = [q for q in ("time", "volts", "amperes") if q not in columns]
@@ -121,6 +123,12 @@ def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, 
         raise AirTouchError(f"{source}:{line}: no column for {', '.join(missing)} in {', '.join(header)!r}; "
                             "name them time_ms, bus_V, current_mA")
     return columns
+
+
+def _other_unit(quantity: str, words: list[str]) -> bool:
+    """True if the words after the first of a column's name have a unit, and none of this quantity: bus_power_mW."""
+    units = [w for w in words if w in UNITS or w in OTHER_UNITS]
+    return quantity in MEASURED and bool(units) and units[-1] not in UNITS_OF[quantity]
 
 
 def power(trace: Trace, where: np.ndarray | None = None) -> Power:

@@ -45,6 +45,20 @@ def test_fresh_packets_after_a_silence_and_a_queue_are_no_restart():
     assert ticks.unwrap(5020, 5.02) == 5020
 
 
+@given(st.integers(0, WRAP_MS // 2), st.floats(1.0, 20.0), st.lists(st.floats(0.001, 5.0), min_size=1, max_size=30))
+def test_a_drone_whose_clock_runs_faster_has_not_restarted(start, speed, silences_s):
+    """As a virtual drone's: after each silence of the host's time it is `speed` times further."""
+    host_s = np.concatenate([[0.0], np.cumsum(silences_s)])
+    true = (start + np.round(1000 * speed * host_s)).astype(int)
+    ticks = Ticks()
+    assert [ticks.unwrap(int(t) % WRAP_MS, at) for t, at in zip(true, 7.0 + host_s, strict=True)] == list(true)
+
+
+def test_a_suspend_that_stops_the_hosts_clock_is_no_restart():
+    ticks = Ticks()
+    assert [ticks.unwrap(t, at) for t, at in ((60_000, 1.0), (90_000, 1.01))] == [60_000, 90_000]
+
+
 @given(st.sets(st.integers(0, 300), min_size=2), st.integers(-3, 3))
 def test_gaps_are_the_samples_that_are_not_there(numbers, jitter):
     slots = np.array(sorted(numbers))

@@ -76,6 +76,23 @@ def test_a_px4_log_is_read_by_the_commands(px4, tmp_path):
         logs.read(px4)
 
 
+@pytest.mark.parametrize(("orientations", "height"), [((0, 25), 0.5), ((25, 0), 3.0), ((0, 12), None)])
+def test_of_distance_sensors_the_one_that_looks_down_is_read(orientations, height):
+    """The first is 3 m from something, the second 0.5 m. 25 is MAV_SENSOR_ROTATION_PITCH_270."""
+    pytest.importorskip("pyulog", reason="PX4 logs need the extra 'ulog'")
+    imu = topic(0, "sensor_combined", {"gyro_rad": 3, "accelerometer_m_s2": 3}, [(t, *[0.0] * 5, -9.81) for t in T])
+    definition = message("F", b"distance_sensor:uint64_t timestamp;float current_distance;uint8_t orientation;")
+    content = [imu[0], definition, imu[1]]
+    for k, (way, metres) in enumerate(zip(orientations, (3.0, 0.5), strict=True)):
+        content.append(message("A", struct.pack("<BH", k, 1 + k) + b"distance_sensor"))
+        content += [message("D", struct.pack("<HQfB", 1 + k, int(t * 1e6), metres, way)) for t in T[::20]]
+    log = ulog.read(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + b"".join(content), "x.ulg")
+    if height is None:
+        assert not log.has("zrange_m") and any("looks down" in w for w in log.meta["warnings"])
+    else:
+        assert np.nanmin(log["zrange_m"]) == np.nanmax(log["zrange_m"]) == height and not log.meta["warnings"]
+
+
 def test_without_pyulog_its_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__("airtouch.extras", fromlist=["EXTRAS"]).EXTRAS, "ulog",
                         ("no_such_module_of_this_name",))

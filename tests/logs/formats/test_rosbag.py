@@ -13,7 +13,10 @@ PERIOD_NS = 10_000_000
 
 @pytest.fixture
 def bag_of(tmp_path):
-    """A function that writes a bag of {topic: (type, frame id, values (n,) or (n, 4))} beside an IMU at rest."""
+    """A function that writes a bag of {topic: (type, frame id, values (n,) or (n, 4))} beside an IMU at rest.
+
+    begin_ns: of the recording; the headers count from 0, as a simulator's do.
+    """
     pytest.importorskip("rosbags", reason="ROS 2 bags need the extra 'ros'")
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -41,7 +44,7 @@ def bag_of(tmp_path):
         layout = kind("std_msgs/msg/MultiArrayLayout")([], 0)
         return kind(name)(layout, np.asarray(value, np.float32 if name == FLOATS else np.uint16))
 
-    def write(topics):
+    def write(topics, begin_ns=0):
         place = tmp_path / "bag"
         topics = {"/imu": (IMU, "body", np.zeros(20)), **topics}
         with Writer(place, version=9) as writer:
@@ -49,7 +52,7 @@ def bag_of(tmp_path):
             for i in range(20):
                 for topic, (name, frame, values) in topics.items():
                     data = store.serialize_cdr(message(name, frame, i * PERIOD_NS, values[i]), name)
-                    writer.write(at[topic], i * PERIOD_NS, data)
+                    writer.write(at[topic], begin_ns + i * PERIOD_NS, data)
         return logs.read(place)
 
     return write
@@ -97,3 +100,17 @@ def test_the_unit_of_the_motors_is_that_of_the_whole_topic(bag_of, kind, command
     log = bag_of({"/motor_cmd": (kind, "", [still] * 5 + [commands] * 15)})
     for i in range(4):
         np.testing.assert_allclose(log[f"m{i + 1}_pwm"], np.r_[np.zeros(5), np.full(15, 65535 * share[i])], atol=1e-2)
+
+
+def test_motors_without_a_header_keep_their_place_where_the_headers_count_from_zero(bag_of):
+    """With use_sim_time: the headers have simulated time, the recording that of 2026."""
+    commands = np.tile(np.linspace(10_000, 48_000, 20)[:, None], 4)
+    log = bag_of({"/motor_pwm": (SHORTS, "", commands), "/tof": (RANGE, "", np.full(20, 0.5))},
+                 begin_ns=1_796_000_000 * 10**9)
+    assert log["m1_pwm"] == pytest.approx(commands[:, 0], abs=2000.0)  # one sample: 1e9 s is exact to 1e-7 s
+    assert (log["zrange_m"] == 0.5).all() and log.meta["warnings"] == []
+
+
+def test_a_column_that_is_empty_in_the_flight_is_named(bag_of):
+    log = bag_of({"/motor_pwm": (SHORTS, "", np.full((20, 4), 30_000)), "/tof": (RANGE, "", np.full(20, np.nan))})
+    assert [w for w in log.meta["warnings"] if "empty" in w] == ["zrange_m is empty: no value while the IMU was logged"]

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from airtouch.crazyflie.connection.blocks import Block
+from airtouch.crazyflie.connection.ticks import host_clock_s
 from airtouch.errors import AirTouchError
 
 BLOCK_S = 1.5  #: s to wait for the first packet of a log block
@@ -104,7 +105,7 @@ class LogBlocks:
                 if not attempt.delivered:
                     attempt.delivered = True
                     attempt.answers.put(None)
-                self._samples.put(Sample(block.name, stamp, time.monotonic(), values))
+                self._samples.put(Sample(block.name, stamp, host_clock_s(), values))
 
         config.data_received_cb.add_callback(take)
         try:

@@ -18,6 +18,8 @@ from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCIT
 from airtouch.logs.quaternion import euler
 
 METADATA = "metadata.yaml"
+STAMPED, RECORDED = 0, 1  #: rows of a table with the headers' times and those of the recording, s
+LATE_S = 1.0  #: s, longest difference that the way to the recorder makes; chosen
 MOTOR_NAMES = ("motor", "pwm", "actuator")
 ARRAYS = ("UInt16MultiArray", "UInt32MultiArray", "Int32MultiArray", "Float32MultiArray", "Float64MultiArray")
 DOWN_NAMES = ("down", "bottom", "zrange")  #: in the topic or the frame id of the range sensor that looks down
@@ -31,12 +33,15 @@ def is_bag(path: str | Path) -> bool:
 
 
 def read(path: str | Path) -> FlightLog:
-    """The flight log of a bag, at 100 Hz. Raises AirTouchError without the extra 'ros' and for a bag without an IMU."""
+    """The flight log of a bag, at 100 Hz, by the times in the headers, or by those of the recording (`_two_clocks`).
+
+    Raises AirTouchError without the extra 'ros' and for a bag without an IMU.
+    """
     need("ros", f"{path}: reading ROS 2 bags")
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    rows: dict[str, dict[str, list[tuple[float, float]]]] = defaultdict(lambda: defaultdict(list))
+    rows: dict[str, dict[str, list[tuple[float, float, float]]]] = defaultdict(lambda: defaultdict(list))
     kinds: dict[str, str] = {}  # of each topic, in the order of their first messages
     frames: dict[str, str] = {}
     try:
@@ -45,17 +50,20 @@ def read(path: str | Path) -> FlightLog:
                 topic, kind = connection.topic, connection.msgtype.rpartition("/")[2]
                 if kind in READERS or (kind in ARRAYS and _is_motor(topic)):
                     message = reader.deserialize(raw, connection.msgtype)
-                    time = _time(message, stamp)
+                    recorded_s = 1e-9 * stamp
+                    stamped_s = _header_s(message) or recorded_s
                     kinds.setdefault(topic, kind)
                     frames.setdefault(topic, str(getattr(getattr(message, "header", None), "frame_id", "")))
                     for name, value in (READERS.get(kind) or _motors)(message):
-                        rows[name][topic].append((time, value))
+                        rows[name][topic].append((stamped_s, recorded_s, value))
     except AirTouchError:
         raise
     except Exception as error:  # a damaged bag makes the library raise any of many
         raise AirTouchError(f"{path}: not a whole ROS 2 bag: {type(error).__name__}: {error}") from None
     chosen = {name: min(topics, key=lambda topic: _rank(topic, kinds, frames)) for name, topics in rows.items()}
-    signals = {name: tuple(np.array(rows[name][topic]).T) for name, topic in chosen.items()}
+    table = {name: np.array(rows[name][topic]).T for name, topic in chosen.items()}
+    clock = RECORDED if _two_clocks(table) else STAMPED
+    signals = {name: (values[clock], values[2]) for name, values in table.items()}
     if PWM[0] in signals:
         pwm = _pwm(np.array([signals[name][1] for name in PWM]), kinds[chosen[PWM[0]]])
         signals |= {name: (signals[name][0], values) for name, values in zip(PWM, pwm, strict=True)}
@@ -86,11 +94,23 @@ def _is_motor(topic: str) -> bool:
     return any(word in topic.lower() for word in MOTOR_NAMES)
 
 
-def _time(message: Any, stamp: int) -> float:
-    """Time of a message in s: the header's, or without one that of the recording."""
+def _header_s(message: Any) -> float:
+    """Time in a message's header in s; 0 without one."""
     header = getattr(message, "header", None)
-    stamped = header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else 0.0
-    return stamped or 1e-9 * stamp
+    return header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else 0.0
+
+
+def _two_clocks(table: dict[str, np.ndarray]) -> bool:
+    """True if headers and recording differ by more in one message than in another by over the recording's length.
+
+    The times of the columns then do not overlap: with use_sim_time headers have simulated time, and messages without
+    one that of the recording.
+    """
+    if not table:
+        return False
+    recorded = np.concatenate([values[RECORDED] for values in table.values()])
+    ahead = np.concatenate([values[RECORDED] - values[STAMPED] for values in table.values()])
+    return bool(np.ptp(ahead) > np.ptp(recorded) + LATE_S)
 
 
 def _xyz(names: tuple[str, ...], vector: Any) -> list[tuple[str, float]]:

@@ -17,6 +17,7 @@ from airtouch.logs.quaternion import euler
 MAGIC = b"ULog\x01\x12\x35"
 FLIP = (1.0, -1.0, -1.0)  #: signs from forward, right, down to forward, left, up
 MOTORS = (0, 3, 1, 2)  #: PX4's index, from 0, of a FlightLog's motors 1 to 4
+DOWN = 25  #: orientation of a distance sensor that looks down, MAV_SENSOR_ROTATION_PITCH_270
 TOPICS = ("sensor_combined", "vehicle_attitude", "vehicle_local_position", "distance_sensor", "battery_status",
           "actuator_motors", "actuator_outputs")
 
@@ -25,16 +26,24 @@ def read(data: bytes, source: str) -> FlightLog:
     """The flight log of a ULog file, at 100 Hz.
 
     Motors are those of `actuator_motors` (0 to 1) or, without that topic, of `actuator_outputs` (1000 to 2000 us),
-    scaled to 0..65535. Raises AirTouchError without the extra 'ulog' and for a file without an IMU.
+    scaled to 0..65535. The down range is that of the first distance sensor that looks down. Raises AirTouchError
+    without the extra 'ulog' and for a file without an IMU.
     """
     need("ulog", f"{source}: reading PX4 logs")
     from pyulog import ULog
 
     try:
-        # the first instance counts
-        topics = {d.name: d.data for d in reversed(ULog(io.BytesIO(data), list(TOPICS)).data_list)}
+        instances = ULog(io.BytesIO(data), list(TOPICS)).data_list
     except Exception as error:  # a damaged file makes the library raise any of many
         raise AirTouchError(f"{source}: not a whole ULog file: {type(error).__name__}: {error}") from None
+    topics = {d.name: d.data for d in reversed(instances)}  # the first instance counts
+    ranges = [d.data for d in instances if d.name == "distance_sensor"]
+    down = [table for table in ranges if _looks_down(table)]
+    warnings = []
+    if ranges:
+        topics["distance_sensor"] = down[0] if down else {}
+        if not down:
+            warnings.append("zrange_m is left out: no distance_sensor looks down (orientation 25)")
     signals: dict[str, Signal] = {}
 
     def add(topic: str, names: tuple[str, ...], fields: tuple[str, ...], signs: tuple[float, ...]) -> None:
@@ -55,7 +64,13 @@ def read(data: bytes, source: str) -> FlightLog:
         turned = np.column_stack([x, -y, -z, w])  # both frames are turned by half a turn about x
         signals |= {name: (table["timestamp"] * 1e-6, v) for name, v in zip(ATTITUDE, euler(turned), strict=True)}
     signals |= _motors(topics)
-    return aligned_log(signals, {"source": source, "format": "ulog", "vehicle": "", "acc_frame": "body"})
+    return aligned_log(signals, {"source": source, "format": "ulog", "vehicle": "", "acc_frame": "body",
+                                 "warnings": warnings})
+
+
+def _looks_down(table: dict) -> bool:
+    """True for a distance sensor whose orientation is DOWN, or is not logged."""
+    return "orientation" not in table or bool((np.asarray(table["orientation"]) == DOWN).all())
 
 
 def _motors(topics: dict) -> dict[str, Signal]:
