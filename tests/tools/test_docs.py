@@ -73,6 +73,27 @@ def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
     assert exact[2].startswith(f"0.{rotors} ")
 
 
+def test_sealed_figures_of_the_results_are_of_the_seed_of_their_command():
+    """Rows of results.md against that seed's column of gap-blind.md."""
+    there = (DOCS / "results.md").read_text("utf-8")
+    seed = re.search(r"^\| sealed set with the relations .*--seed (\d+)`", there, re.M).group(1)
+    head, _, *measured = tables((DOCS / "gap-blind.md").read_text("utf-8").split("## Goals, and")[1].split("\n## ")[0])
+    column = head.index(f"seed {seed}")
+    value = {row[0]: (row[column], row[column + 1]) for row in measured}
+    reached = dict(tables(there.split("\n## Gaps\n")[1].split("\n(*)")[0]))
+    right, alarms = reached["own sealed set, with the [relations of signals](gap-relations.md)"].split("; ")
+    figure, n = value["first answer right, single effects"]
+    assert figure in right and right.endswith(f" of {n}") and f"in {figure.split(' [')[0]} of sim" in there[:1000]
+    figure, n = value["false alarms"]
+    count, low_high = re.match(r"(\d+) false alarms in \d+ \[(.*) %\]", alarms).groups()
+    assert figure.split(" %")[0] == f"{100 * int(count) / int(n):.1f}" and low_high in figure
+    figure, n = value["effect left out, all flights: AUROC; a wrong name"]
+    assert reached["the same: effects that the registry lacks"] == f"a wrong name for {figure.split('; ')[1]} of {n}"
+    weak, pair = (" of ".join(value[name]) for name in (
+        "at the weakest strength", "both effects of a pair, and nothing else"))
+    assert reached["the same: the weakest strengths; both effects of a pair"] == f"{weak}; {pair}"
+
+
 def tables(text):
     """The cells of each row of a page's tables."""
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
