@@ -128,7 +128,7 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
 
     results = (DOCS / "results.md").read_text("utf-8")
     goals = page[page.index("## Goals"):page.index("## Flight by flight")].splitlines()
-    for truth, sign in (("none", "same, rules only"), ("ground effect", "effect named"),
+    for truth, sign in (("none", "same, rule flights"), ("ground effect", "effect named"),
                         ("downwash", "downwash named, no")):
         goal_lines = "".join(line for line in goals if sign in line)
         assert total(view, truth) in goal_lines and total(view, truth) in results, truth
