@@ -53,8 +53,9 @@ def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
     high, others = (cells_of("### Where `best` fails", "0201")[i] for i in (2, 3))
     missed_high, high_edges = map(int, re.match(r"(\d+) of (\d+)", high).groups())
     other_edges = re.match(r"none of (\d+)", others)
-    assert edges[1].startswith(f"{missed_high} of {high_edges + int(other_edges.group(1))} missed on one of their days, "
-                               f"held out whole: all {missed_high} are among its {high_edges} edges")
+    all_edges = high_edges + int(other_edges.group(1))
+    assert edges[1].startswith(f"{missed_high} of {all_edges} missed on one of their days, held out whole: "
+                               f"all {missed_high} are among its {high_edges} edges")
     for said, name in zip(simulated, ("`paper-4cm`", "`paper-mixed`"), strict=True):
         seeds = cells_of("## Flights of the virtual drone", name)[2:]
         assert "({}) {} % of the 40 edges of one seed are missed and {} % of the 40 of another".format(
