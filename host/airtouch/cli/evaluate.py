@@ -72,8 +72,8 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
     if trained_on:
-        screen.print(f"warning: the model was trained on {_which(trained_on, len(scores))}, so these figures do not hold "
-                     "for other flights; airtouch crossval estimates those")
+        screen.print(f"warning: the model was trained on {_which(trained_on, len(scores))}, so these figures do not "
+                     "hold for other flights; airtouch crossval estimates those")
     if json_path:
         show.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
