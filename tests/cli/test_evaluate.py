@@ -48,6 +48,15 @@ def test_the_scores_of_a_folder_are_those_of_its_edges(generated, tmp_path):
     assert "missed" in result.output and "false/min" in result.output
 
 
+@pytest.mark.parametrize(("trained", "of", "says"), [
+    (1, 1, "this flight, so"), (3, 3, "all 3 of these flights, so"), (1, 3, "1 of these 3 flights, so")])
+def test_the_warning_counts_only_where_there_is_something_to_count(generated, monkeypatch, trained, of, says):
+    numbers = iter(range(of))
+    monkeypatch.setattr(at.detector.evaluation.evaluate.training_set, "contains", lambda *_: next(numbers) < trained)
+    result = run(*sorted(generated.glob("*.csv*"))[:of], "--speed", 0.3)
+    assert f"the model was trained on {says}" in " ".join(result.output.split())
+
+
 def test_a_fold_without_flights_is_named(generated):
     result = run(generated, "--detector", "baseline", "--fold", "77")
     assert isinstance(result.exception, AirTouchError)

@@ -44,6 +44,12 @@ def test_every_figure_of_every_summary_is_printed(width, count):
     assert text.count("90% - 100%") == count and text.count("a title") == text.count("95 % interval") == 1
 
 
+def test_the_caption_explains_columns_that_are_there():
+    explained = re.findall(r"(?:^|\. )([^.:]+(?:\.\d+ m)?): ", scores.CAPTION)
+    assert explained[0] == "second line" and len(explained) == 4
+    assert set(explained[1:]) <= set(COLUMNS)
+
+
 @pytest.fixture(scope="module")
 def diagnosis():
     """Of all effects but the loop's; how the nominal flights scatter is no matter of the tables' width."""

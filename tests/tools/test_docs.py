@@ -53,16 +53,19 @@ def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
     high, others = (cells_of("### Where `best` fails", "0201")[i] for i in (2, 3))
     missed_high, high_edges = map(int, re.match(r"(\d+) of (\d+)", high).groups())
     other_edges = re.match(r"none of (\d+)", others)
-    assert edges[1].startswith(f"{missed_high} of {high_edges + int(other_edges.group(1))} missed on one of their days")
+    all_edges = high_edges + int(other_edges.group(1))
+    assert edges[1].startswith(f"{missed_high} of {all_edges} missed on one of their days, held out whole: "
+                               f"all {missed_high} are among its {high_edges} edges")
     for said, name in zip(simulated, ("`paper-4cm`", "`paper-mixed`"), strict=True):
         seeds = cells_of("## Flights of the virtual drone", name)[2:]
-        assert said.startswith("{} and {} % of 40 missed".format(*numbers(*seeds))) and name in said
+        assert "({}) {} % of the 40 edges of one seed are missed and {} % of the 40 of another".format(
+            name, *numbers(*seeds)) in said
     detector = "## A detector from the simulator"
     small, large = (cells_of(detector, name) for name in ("the twin and the free air of the other half (two trainings)",
                                                           "the same"))
-    assert trained[0] == "edges {} m off, {} % missed in 34 flights".format(*numbers(*small[2:4])), small
+    assert trained[0].startswith("edges {} m off, {} % missed in 34 flights;".format(*numbers(*small[2:4]))), small
     assert "34 flights" in small[1] and "53 flights" in large[1]
-    assert re.match("{} m off, .*{} % missed in the 53 others".format(*numbers(*large[2:4])), trained[1]), large
+    assert trained[1].startswith("edges {} m off, {} % missed in the 53 others;".format(*numbers(*large[2:4]))), large
     ground = cells_of("## Gaps", "the same, **day 21** (*)")[1].split(", ")
     assert any(part.startswith(named[0].split(" ground")[0]) for part in ground)
     crazypad = cells_of("## Gaps", "CrazyPAD, real defects, no gyro")[1]
@@ -71,6 +74,27 @@ def test_figures_of_the_first_table_of_the_readme_are_those_of_the_results():
     page = (DOCS / "gap-crazypad.md").read_text("utf-8")
     exact = next(cells for cells in tables(page) if cells[0] == "the same of all 72 flights")
     assert exact[2].startswith(f"0.{rotors} ")
+
+
+def test_sealed_figures_of_the_results_are_of_the_seed_of_their_command():
+    """Rows of results.md against that seed's column of gap-blind.md."""
+    there = (DOCS / "results.md").read_text("utf-8")
+    seed = re.search(r"^\| sealed set with the relations .*--seed (\d+)`", there, re.M).group(1)
+    head, _, *measured = tables((DOCS / "gap-blind.md").read_text("utf-8").split("## Goals, and")[1].split("\n## ")[0])
+    column = head.index(f"seed {seed}")
+    value = {row[0]: (row[column], row[column + 1]) for row in measured}
+    reached = dict(tables(there.split("\n## Gaps\n")[1].split("\n(*)")[0]))
+    right, alarms = reached["own sealed set, with the [relations of signals](gap-relations.md)"].split("; ")
+    figure, n = value["first answer right, single effects"]
+    assert figure in right and right.endswith(f" of {n}") and f"in {figure.split(' [')[0]} of sim" in there[:1000]
+    figure, n = value["false alarms"]
+    count, low_high = re.match(r"(\d+) false alarms in \d+ \[(.*) %\]", alarms).groups()
+    assert figure.split(" %")[0] == f"{100 * int(count) / int(n):.1f}" and low_high in figure
+    figure, n = value["effect left out, all flights: AUROC; a wrong name"]
+    assert reached["the same: effects that the registry lacks"] == f"a wrong name for {figure.split('; ')[1]} of {n}"
+    weak, pair = (" of ".join(value[name]) for name in (
+        "at the weakest strength", "both effects of a pair, and nothing else"))
+    assert reached["the same: the weakest strengths; both effects of a pair"] == f"{weak}; {pair}"
 
 
 def tables(text):
@@ -105,7 +129,7 @@ def test_figures_of_recorded_flights_are_the_sums_of_their_tables():
 
     results = (DOCS / "results.md").read_text("utf-8")
     goals = page[page.index("## Goals"):page.index("## Flight by flight")].splitlines()
-    for truth, sign in (("none", "same, rules only"), ("ground effect", "effect named"),
+    for truth, sign in (("none", "same, rule flights"), ("ground effect", "effect named"),
                         ("downwash", "downwash named, no")):
         goal_lines = "".join(line for line in goals if sign in line)
         assert total(view, truth) in goal_lines and total(view, truth) in results, truth

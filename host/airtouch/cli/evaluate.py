@@ -72,14 +72,21 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
     if trained_on:
-        screen.print(f"warning: the model was trained on {trained_on} of these {len(scores)} flights; how it does on "
-                     "others is what airtouch crossval says")
+        screen.print(f"warning: the model was trained on {_which(trained_on, len(scores))}, so these figures do not "
+                     "hold for other flights; airtouch crossval estimates those")
     if json_path:
         show.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
     show.left_out(failures, len(scores))
     if failures:
         sys.exit(2)
+
+
+def _which(count: int, of: int) -> str:
+    """So many of the flights, in words."""
+    if count < of:
+        return f"{count} of these {of} flights"
+    return "this flight" if of == 1 else f"all {of} of these flights"
 
 
 def _print_remarks(remarks: dict[str, list[str]]) -> None:

@@ -86,6 +86,11 @@ def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
     assert edges.any()
 
 
+def test_the_program_on_the_page_is_the_one_that_is_built_here():
+    (program,) = re.findall(r"```cpp\n(.+?)```", PAGE, re.S)
+    assert program == (ROOT / "tests/firmware/kernels/port/example.cpp").read_text()
+
+
 @pytest.mark.parametrize("header", PUBLIC, ids=lambda path: path.name)
 def test_a_public_header_says_what_it_needs_and_is_cpp(header, tmp_path):
     text = header.read_text()

@@ -12,8 +12,9 @@ from rich.table import Table
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
-CAPTION = ("second line: 95 % interval, bootstrap by flight. A miss has no detection within 1.5 s; a detection serves "
-           "one edge, the others are false. Hits: fraction of all true edges.")
+CAPTION = ("second line: 95 % interval, bootstrap by flight. missed: no detection is within 1.5 s of the edge. "
+           "false/min: detections a minute that belong to no edge; each edge has one at most. "
+           "in 0.05 m: fraction of all true edges, missed ones included, whose error is at most 0.05 m.")
 WIDE = 150  #: columns of a terminal on which a row of figures fits
 SUMMARY_WIDTH, NAME_WIDTH = 17, 22  #: columns of a summary, and of the figures' names, where they stand side by side
 SIDE_BY_SIDE = [{"s": "mean |error|, s"}.get(name, name) for name in ("flights", "edges", *COLUMNS)]

@@ -128,7 +128,7 @@ EFFECT = Effect(
                "how far the rotors share their mean lift evenly; 1: no pitch moment where an edge covers some of them",
                "at exits the authors' flights pitch the other way than a partly covered drone should"),
      Parameter("leaving", "1", 0.0, -0.2, 0.2, 0.0,
-               "share of the thrust lost when the drone is half beyond the surface's end",
+               "fraction of the thrust lost when the drone is half beyond the surface's end",
                "authors' flights: 0.2 m/s^2 downwards at exits that no thrust explains, none at entries; cause not "
                "known")),
     wrench=ground_effect,

@@ -11,6 +11,6 @@ EFFECT = Effect(
     "weak_motor", "one rotor gives less thrust",
     (Parameter("rotor", "1", 1, 1, 4, None, "1 front right, 2 rear right, 3 rear left, 4 front left",
                integer=True),
-     Parameter("thrust_loss", "1", 0.1, -0.3, 0.9, 0.0, "share of its thrust lost",
+     Parameter("thrust_loss", "1", 0.1, -0.3, 0.9, 0.0, "fraction of its thrust lost",
                "CrazyPAD: cut propellers")),
     settings=settings)

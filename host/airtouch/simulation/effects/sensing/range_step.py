@@ -15,6 +15,6 @@ EFFECT = Effect(
                "paper's fork: a fixed height is added after a drop of more than 0.30 m"),
      Parameter("kick", "m", 0.05, -1.0, 1.0, 0.0, "error of the one reading on which the step is noticed",
                "authors' flights: a thrust kick four samples after nearly every edge"),
-     Parameter("mixed", "1", 0.0, 0.0, 1.0, 0.0, "share of edges whose one reading in passing mixes both surfaces",
+     Parameter("mixed", "1", 0.0, 0.0, 1.0, 0.0, "fraction of edges whose one reading in passing mixes both surfaces",
                "authors' flights: nearly every edge")),
     settings=settings)
