@@ -90,13 +90,19 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
-    """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised."""
+    """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised.
+
+    The seal and the key go first: of a set that is broken off later nothing is left to score it by.
+    """
     for path in (out / SEALED, key):
         if path.exists() and not force:
             raise AirTouchError(f"{path}: exists already; use --force to replace it")
     out.mkdir(parents=True, exist_ok=True)
-    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob(OPENED)] if force else []:
-        old.unlink()
+    if force:
+        for path in (out / SEALED, key, out / OPENED):
+            path.unlink(missing_ok=True)
+        for old in [*out.glob("flight_*"), *out.glob("cal_*")]:
+            old.unlink()
 
 
 def _log_ratio_of_one(study: Study, log: FlightLog, effects: Sequence[DrawnEffect]) -> float | None:

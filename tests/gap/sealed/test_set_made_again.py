@@ -1,0 +1,32 @@
+"""A sealed set that is made again, broken off or asked for with other numbers: no flight meets another set's key."""
+
+import json
+
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.gap.sealed import key as blind_key
+from airtouch.gap.sealed import make as blind
+from airtouch.gap.sealed import run as blind_run
+
+
+def broken_off(*_):
+    raise KeyboardInterrupt
+
+
+def sealed_set(folder, flights=2, seed=5):
+    """A folder with the files of a set, and its key beside it; the flights are empty."""
+    folder.mkdir()
+    for name in (*(f"cal_{i}" for i in range(blind.CAL)), *(f"flight_{i:04d}" for i in range(flights))):
+        (folder / f"{name}.csv.gz").touch()
+    drawn = {f"flight_{i:04d}": blind_key.DrawnFlight(()) for i in range(flights)}
+    blind_key.seal(folder, blind_key.key_of(folder), blind_key.Key(drawn, {}, {"salt": "x", "seed": seed}), blind.CAL)
+    return folder
+
+
+def test_a_set_whose_replacement_is_broken_off_has_no_seal_and_no_key(tmp_path, monkeypatch):
+    folder = sealed_set(tmp_path / "set")
+    monkeypatch.setattr(blind, "nominal", broken_off)
+    with pytest.raises(KeyboardInterrupt):
+        blind.make(folder, 3, force=True)
+    assert not (folder / "sealed.json").exists() and not blind_key.key_of(folder).exists()
