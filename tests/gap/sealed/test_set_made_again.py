@@ -30,3 +30,14 @@ def test_a_set_whose_replacement_is_broken_off_has_no_seal_and_no_key(tmp_path, 
     with pytest.raises(KeyboardInterrupt):
         blind.make(folder, 3, force=True)
     assert not (folder / "sealed.json").exists() and not blind_key.key_of(folder).exists()
+
+
+def test_answers_to_the_flights_of_an_older_set_go_with_it(tmp_path, monkeypatch):
+    folder = sealed_set(tmp_path / "set")
+    (folder / "answers").mkdir()
+    for name in ("flight_0001.json", "flight_0001.without.mass.json", "notes.json"):
+        (folder / "answers" / name).touch()
+    monkeypatch.setattr(blind, "nominal", broken_off)
+    with pytest.raises(KeyboardInterrupt):
+        blind.make(folder, 3, force=True)
+    assert [p.name for p in (folder / "answers").iterdir()] == ["notes.json"]

@@ -11,6 +11,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
 SEALED, OPENED = "sealed.json", "opened.json"  #: files in the folder of a set: the key's hash; that of the answers
+ANSWERS = "answers"  #: folder in it that `run` writes the diagnoses to
 
 
 @dataclass(frozen=True)

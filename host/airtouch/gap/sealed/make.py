@@ -17,7 +17,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
+from airtouch.gap.sealed.key import ANSWERS, OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
 from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
@@ -90,9 +90,9 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
-    """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised.
+    """Make the folder of a set; with force the flights and answers of an older one are deleted.
 
-    The seal and the key go first: of a set that is broken off later nothing is left to score it by.
+    Without force AirTouchError is raised where there is one. The seal and the key go first: of a set that is broken off later nothing is left to score it by.
     """
     for path in (out / SEALED, key):
         if path.exists() and not force:
@@ -101,7 +101,7 @@ def _clear(out: Path, key: Path, force: bool) -> None:
     if force:
         for path in (out / SEALED, key, out / OPENED):
             path.unlink(missing_ok=True)
-        for old in [*out.glob("flight_*"), *out.glob("cal_*")]:
+        for old in [*out.glob("flight_*"), *out.glob("cal_*"), *(out / ANSWERS).glob("flight_*.json")]:
             old.unlink()
 
 

@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
-from airtouch.gap.sealed.key import SEALED, answers_sha256, open_key
+from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.study import Study
@@ -60,7 +60,7 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
     out = Path(out)
     if not (out / SEALED).exists():
         make.make(out, flights, seed, progress=progress)
-    answers = out / "answers"
+    answers = out / ANSWERS
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, mapper)
