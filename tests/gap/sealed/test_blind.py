@@ -73,8 +73,9 @@ def test_diagnosis_names_clear_effects(blind_check):
 def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch):
     """Also for those beyond the ten thousandth, whose names are longer."""
     names, opened = ["flight_1000", "flight_10000"], []
-    for name in ("sealed.json", *(f"{n}.csv.gz" for n in names)):
-        (tmp_path / name).touch()
+    (tmp_path / "sealed.json").write_text(json.dumps({"key_sha256": "", "flights": 2}))
+    for name in names:
+        (tmp_path / f"{name}.csv.gz").touch()
 
     def answer(folder, answers, cases, *_):
         answers.mkdir(exist_ok=True)

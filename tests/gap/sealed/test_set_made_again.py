@@ -41,3 +41,35 @@ def test_answers_to_the_flights_of_an_older_set_go_with_it(tmp_path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         blind.make(folder, 3, force=True)
     assert [p.name for p in (folder / "answers").iterdir()] == ["notes.json"]
+
+
+def test_flights_of_a_set_that_was_broken_off_make_room(tmp_path, monkeypatch):
+    """Left there, `run` would diagnose them with the flights of a smaller set and not find them in its key."""
+    folder = tmp_path / "set"
+
+    def break_off(out):
+        with pytest.raises(KeyboardInterrupt):
+            blind.make(out, 3)
+
+    monkeypatch.setattr(blind, "nominal", broken_off)
+    break_off(folder)
+    for name in ("flight_0000.csv.gz", "cal_0.csv.gz", "flight_own.csv.gz"):
+        (folder / name).touch()
+    break_off(folder)
+    assert [p.name for p in folder.glob("*.gz")] == ["flight_own.csv.gz"]
+
+
+def test_flights_that_no_set_began_stay(tmp_path):
+    own = tmp_path / "flight_0000.csv.gz"
+    own.touch()
+    with pytest.raises(AirTouchError, match="--force"):
+        blind.make(tmp_path, 3)
+    assert own.exists()
+
+
+def test_a_folder_with_more_flights_than_were_sealed_is_refused_before_the_key_is_opened(tmp_path):
+    folder = sealed_set(tmp_path / "set", flights=2)
+    (folder / "flight_0002.csv.gz").touch()
+    with pytest.raises(AirTouchError, match="3 flights, but 2 were sealed"):
+        blind_run.run(folder)
+    assert not (folder / "opened.json").exists()

@@ -82,6 +82,16 @@ def seal(folder: Path, path: Path, key: Key, calibration_flights: int) -> None:
     write_bytes(_json(sealed, indent=1), folder / SEALED, True)
 
 
+def sealed_in(folder: Path) -> dict[str, Any]:
+    """What `seal` wrote into the folder of a set; raises AirTouchError where it is not there."""
+    try:
+        sealed = json.loads((folder / SEALED).read_text(encoding="utf-8"))
+        return {"key_sha256": sealed["key_sha256"], "flights": sealed["flights"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
+                            "`airtouch gap blind make`") from None
+
+
 def answers_sha256(cases: Sequence[Mapping[str, Any]]) -> str:
     """The hash of some diagnoses, by which it is known whether others were scored before."""
     return hashlib.sha256(json.dumps(cases, sort_keys=True).encode()).hexdigest()
@@ -94,11 +104,7 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
     changed or cannot be read, and when other answers are already scored: who has seen the key cannot answer blindly.
     """
     folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
-    try:
-        sealed = json.loads((folder / SEALED).read_text(encoding="utf-8"))["key_sha256"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
-                            "`airtouch gap blind make`") from None
+    sealed = sealed_in(folder)["key_sha256"]
     try:
         content = key.read_bytes()
     except OSError as error:

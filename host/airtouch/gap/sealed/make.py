@@ -4,6 +4,7 @@ A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` f
 `sealed.json` with the SHA-256 of the key (`key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
+import re
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
@@ -39,6 +40,8 @@ AT_ONCE = 4  #: kinds of effects whose severities two processes share at a time;
 MOST_FLOWN = 10  #: flights flown for each that is to end well; chosen
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
+UNSEALED = "unsealed"  #: file in the folder of a set that is being made; what is left of one that was broken off
+OWN_NAME = re.compile(r"(flight|cal)_\d+\.csv\.gz")  #: of the flights of a set
 Say = Callable[[str], None]
 Severities = Mapping[str, Sequence[float]]  #: of each kind of effect, its three strengths in rising order
 
@@ -62,8 +65,8 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
 
-    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError when
-    there is a set or a key already and `force` is not given.
+    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError when there is a set, a
+    key or a flight already and `force` is not given, but for flights of a set that was broken off.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
     _clear(out, key, force)
@@ -86,23 +89,27 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         flown_with[name] = DrawnFlight(effects, _log_ratio_of_one(study, log, effects))
     drawn = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE}
     seal(out, key, Key(flown_with, plan.severities, drawn), CAL)
+    (out / UNSEALED).unlink()
     return key
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
-    """Make the folder of a set; with force the flights and answers of an older one are deleted.
+    """Make the folder of a set; the flights of one that was broken off are deleted, with force those of any set.
 
-    Without force AirTouchError is raised where there is one. The seal and the key go first: of a set that is broken off later nothing is left to score it by.
+    The seal and the key go first: of a set that is broken off later nothing is left to score it by. Raises
+    AirTouchError where there is a set, a key or a flight and neither is the case.
     """
     for path in (out / SEALED, key):
         if path.exists() and not force:
             raise AirTouchError(f"{path}: exists already; use --force to replace it")
     out.mkdir(parents=True, exist_ok=True)
-    if force:
-        for path in (out / SEALED, key, out / OPENED):
-            path.unlink(missing_ok=True)
-        for old in [*out.glob("flight_*"), *out.glob("cal_*"), *(out / ANSWERS).glob("flight_*.json")]:
-            old.unlink()
+    old = [path for path in out.iterdir() if OWN_NAME.fullmatch(path.name)]
+    if old and not force and not (out / UNSEALED).exists():
+        raise AirTouchError(f"{out}: flights of no sealed set are in it; choose another folder, or replace them with "
+                            "`airtouch gap blind make --force`")
+    for path in (out / SEALED, key, out / OPENED, *old, *(out / ANSWERS).glob("flight_*.json")):
+        path.unlink(missing_ok=True)
+    write_bytes(b"", out / UNSEALED, True)
 
 
 def _log_ratio_of_one(study: Study, log: FlightLog, effects: Sequence[DrawnEffect]) -> float | None:

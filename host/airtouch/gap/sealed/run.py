@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
-from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key
+from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.study import Study
@@ -62,6 +62,10 @@ def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unkno
         make.make(out, flights, seed, progress=progress)
     answers = out / ANSWERS
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
+    sealed = sealed_in(out)["flights"]
+    if len(names) != sealed:
+        raise AirTouchError(f"{out}: {len(names)} flights, but {sealed} were sealed; make the set anew with "
+                            "`airtouch gap blind make --force`")
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, mapper)
     # the key is opened for these answers; effects can be withheld only when they are known
