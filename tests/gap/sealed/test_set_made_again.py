@@ -1,9 +1,9 @@
 """A sealed set that is made again, broken off or asked for with other numbers: no flight meets another set's key."""
 
-import json
-
 import pytest
+from click.testing import CliRunner
 
+from airtouch.cli.gap import command
 from airtouch.errors import AirTouchError
 from airtouch.gap.sealed import key as blind_key
 from airtouch.gap.sealed import make as blind
@@ -73,3 +73,20 @@ def test_a_folder_with_more_flights_than_were_sealed_is_refused_before_the_key_i
     with pytest.raises(AirTouchError, match="3 flights, but 2 were sealed"):
         blind_run.run(folder)
     assert not (folder / "opened.json").exists()
+
+
+@pytest.mark.parametrize(("asked", "says"), [(["--flights", "500"], "flights 2 is there, not 500"),
+                                             (["--seed", "99"], "seed 5 is there, not 99")])
+def test_other_numbers_than_those_of_the_set_are_refused(tmp_path, monkeypatch, asked, says):
+    folder = sealed_set(tmp_path / "set", flights=2, seed=5)
+    result = CliRunner().invoke(command, ["blind", "run", str(folder), *asked])
+    assert isinstance(result.exception, AirTouchError) and says in str(result.exception)
+
+
+@pytest.mark.parametrize("asked", [[], ["--flights", "2", "--seed", "5"]])
+def test_the_numbers_of_the_set_or_none_go_on(tmp_path, monkeypatch, asked):
+    folder = sealed_set(tmp_path / "set", flights=2, seed=5)
+    monkeypatch.setattr(blind_run, "study_in", broken_off)
+    assert "is there" not in str(CliRunner().invoke(command, ["blind", "run", str(folder), *asked]).exception)
+    with pytest.raises(KeyboardInterrupt):  # it came as far as the study
+        blind_run.run(folder, *map(int, asked[1::2]))

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
@@ -92,10 +93,13 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     make_folder(out)
     if not (out / "sealed.json").exists():
         click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
+    source = click.get_current_context().get_parameter_source
+    asked = [None if source(name) == ParameterSource.DEFAULT else value
+             for name, value in (("flights", flights), ("seed", seed))]
     with Bar() as bar:
         from airtouch.gap.sealed import run as check
 
-        figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
+        figures = check.run(out, *asked, workers=workers, mapper=spread, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 

@@ -92,6 +92,14 @@ def sealed_in(folder: Path) -> dict[str, Any]:
                             "`airtouch gap blind make`") from None
 
 
+def seed_of(folder: Path) -> int | None:
+    """The seed of a set, by the key beside it, of which no more is read; None where there is no such key."""
+    try:
+        return json.loads(key_of(folder).read_text(encoding="utf-8"))["seed"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def answers_sha256(cases: Sequence[Mapping[str, Any]]) -> str:
     """The hash of some diagnoses, by which it is known whether others were scored before."""
     return hashlib.sha256(json.dumps(cases, sort_keys=True).encode()).hexdigest()
