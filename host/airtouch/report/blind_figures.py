@@ -32,7 +32,8 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
 
     left_out: groups of flights whose effect was left out, keys of the score's `unknown`.
     """
-    shown = [("top-1, single effects", "top_1"), ("top-3, single effects", "top_3")]
+    shown = [("top-1, single effects", "top_1"), ("top-3, single effects", "top_3"),
+             ("right rotor or loop, where the first answer is right", "right_variant")]
     for level in SEVERITIES:
         shown += [(f"top-1, {level} severity", f"by_severity/{level}/top_1"),
                   (f"test for the true effect at its true strength, {level} severity", f"by_severity/{level}/ideal")]
@@ -70,7 +71,7 @@ def _in_words(figure: Mapping[str, Any]) -> str:
 
 
 def effect_rows(score: Mapping[str, Any]) -> Rows:
-    """Rows (effect, top-1, top-3, median parameter error), one for each kind of effect."""
+    """Rows (effect, top-1, top-3, median parameter error), one for each kind of effect, right by the effect's name."""
     out: Rows = []
     for kind, part in score["by_effect"].items():
         error = score["parameters"]["by_effect"].get(kind)

@@ -272,6 +272,33 @@ def test_scores_in_closed_form():
         blind_score.figures(key, [answer("z", "none", [("none", 1.0)])])
 
 
+def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
+    """Rotor 1 called 3, the rate's gain called the height's, and each rightly; mass has no variants."""
+    free, fixed = {"value": 0.2, "low": 0.1, "high": 0.3, "unit": "1"}, {"value": 1.0, "unit": "1"}
+
+    def truth(name, kind, values):
+        return {"effects": [{"name": name, "kind": kind, "level": 0, "values": values}]}
+
+    def motor(rotor):
+        return {"thrust_loss": free, "rotor": {"value": rotor, "unit": "1"}}
+
+    def gain(loop):
+        return {name: free if name == loop else fixed for name in ("rate", "attitude", "position", "height")}
+
+    weak = truth("weak_motor", "weak_motor", {"rotor": 1.0, "thrust_loss": 0.2})
+    rate = truth("controller_gain", "controller_gain rate", {"rate": 1.2})
+    flights = {"a": (weak, motor(3.0)), "b": (weak, motor(1.0)), "c": (rate, gain("height")),
+               "d": (rate, gain("rate")), "e": (truth("mass", "mass", {"fraction": 0.1}), {"fraction": free})}
+    key = blind_key.key_from({"answers": {n: true for n, (true, _) in flights.items()}})
+    cases = [answer(n, "effect", [(name, 1.0)], [(name, q)]) for n, (true, q) in flights.items()
+             for name in [true["effects"][0]["name"]]]
+    figures = blind_score.figures(key, cases)
+    assert figures["top_1"]["hits"] == 5
+    assert (figures["right_variant"]["hits"], figures["right_variant"]["n"]) == (2, 4)
+    assert ("right rotor or loop, where the first answer is right", "4") in {
+        (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
+
+
 def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():
     def case(**nats):
         return {"ranking": [{"name": n, "nats": x} for n, x in nats.items()]}

@@ -111,7 +111,7 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     from airtouch.report import blind_figures
 
     for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.score_rows(figures)),
-                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
+                        (("kind", "effect in top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
         table = Table(*heads)
         for row in rows:
             table.add_row(*row)

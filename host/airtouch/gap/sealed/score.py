@@ -16,6 +16,9 @@ from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import SEEN
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.random_draws import own_parameter
+from airtouch.gap.signatures.signature import signature_of
+from airtouch.simulation.effects import get
 
 Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
@@ -85,10 +88,12 @@ def read_answers(path: Path) -> list[Answer]:
 def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     """All figures of a set, JSON-ready. A flight without a diagnosis counts as wrong.
 
+    Right means the effect by name (or another name of it); right_variant says how often its rotor or loop is right too.
+
     flights, diagnosed, effects: numbers of flights, of diagnoses, of effects drawn alone. Of single effects: top_1,
     top_3, exact (named, and nothing else), by_severity, by_effect, misses. Of flights free of effects: false_alarms
     (anything but `none`), false_unknown. Of pairs: pairs_exact, pairs_one_right. The others as the functions of these
-    names say: unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis of a flight
+    names say: right_variant, unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis of a flight
     that is not in the key.
     """
     sheet = sheet_of(key, cases)
@@ -96,6 +101,7 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     return {
         "flights": len(key.flights), "diagnosed": len(answers), "effects": len({e.name for e in single.values()}),
         "top_1": share(sheet.is_first.values()), "top_3": share(sheet.in_first_three.values()),
+        "right_variant": right_variant(sheet),
         "exact": share(same_things(_named(answers.get(n)), [e.name]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
@@ -170,6 +176,29 @@ def ideal(key: Key, flights: Sequence[str]) -> Figure:
 def top(case: Answer | None, name: str, first: int) -> bool:
     """Whether an effect, or another name of it, is among the first of a ranking."""
     return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
+
+
+def right_variant(sheet: Sheet) -> Figure:
+    """How often the variant is right too: the rotor of an effect of one rotor, the parameter that a kind scales alone.
+
+    n: flights whose single effect has variants, is first and is named.
+    """
+    named = {n: [f for f in sheet.full_registry[n]["effects"] if f["name"] == e.name]
+             for n, e in sheet.single_effect.items() if sheet.is_first[n] and has_variants(e)}
+    return share(any(same_variant(sheet.single_effect[n], f["parameters"]) for f in found)
+                 for n, found in named.items() if found)
+
+
+def has_variants(effect: DrawnEffect) -> bool:
+    """Whether an effect is one of several of its name: of one rotor, or of one parameter."""
+    return bool(signature_of(get(effect.name)).several_by or own_parameter(effect.name, effect.kind))
+
+
+def same_variant(effect: DrawnEffect, parameters: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Whether parameters of a named effect, as JSON, are of the rotor that was drawn, and free that parameter alone."""
+    by, own = signature_of(get(effect.name)).several_by, own_parameter(effect.name, effect.kind)
+    free = [name for name, quantity in parameters.items() if "low" in quantity]
+    return (not by or parameters.get(by, {}).get("value") == effect.values[by]) and (own is None or free == [own])
 
 
 def unknown(sheet: Sheet) -> dict[str, Any]:
