@@ -14,11 +14,9 @@ from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import SEEN
+from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
-from airtouch.gap.signatures.random_draws import own_parameter
-from airtouch.gap.signatures.signature import signature_of
-from airtouch.simulation.effects import get
 
 Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
@@ -93,8 +91,8 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     flights, diagnosed, effects: numbers of flights, of diagnoses, of effects drawn alone. Of single effects: top_1,
     top_3, exact (named, and nothing else), by_severity, by_effect, misses. Of flights free of effects: false_alarms
     (anything but `none`), false_unknown. Of pairs: pairs_exact, pairs_one_right. The others as the functions of these
-    names say: right_variant, unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis of a flight
-    that is not in the key.
+    names say: right_variant, unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis
+    of a flight that is not in the key.
     """
     sheet = sheet_of(key, cases)
     answers, single = sheet.full_registry, sheet.single_effect
@@ -187,18 +185,6 @@ def right_variant(sheet: Sheet) -> Figure:
              for n, e in sheet.single_effect.items() if sheet.is_first[n] and has_variants(e)}
     return share(any(same_variant(sheet.single_effect[n], f["parameters"]) for f in found)
                  for n, found in named.items() if found)
-
-
-def has_variants(effect: DrawnEffect) -> bool:
-    """Whether an effect is one of several of its name: of one rotor, or of one parameter."""
-    return bool(signature_of(get(effect.name)).several_by or own_parameter(effect.name, effect.kind))
-
-
-def same_variant(effect: DrawnEffect, parameters: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether parameters of a named effect, as JSON, are of the rotor that was drawn, and free that parameter alone."""
-    by, own = signature_of(get(effect.name)).several_by, own_parameter(effect.name, effect.kind)
-    free = [name for name, quantity in parameters.items() if "low" in quantity]
-    return (not by or parameters.get(by, {}).get("value") == effect.values[by]) and (own is None or free == [own])
 
 
 def unknown(sheet: Sheet) -> dict[str, Any]:
