@@ -90,3 +90,23 @@ def test_the_numbers_of_the_set_or_none_go_on(tmp_path, monkeypatch, asked):
     assert "is there" not in str(CliRunner().invoke(command, ["blind", "run", str(folder), *asked]).exception)
     with pytest.raises(KeyboardInterrupt):  # it came as far as the study
         blind_run.run(folder, *map(int, asked[1::2]))
+
+
+def test_a_damaged_record_of_the_opening_is_told(tmp_path):
+    folder = sealed_set(tmp_path / "set")
+    for content in ("", "[]", "{}"):
+        (folder / "opened.json").write_text(content)
+        with pytest.raises(AirTouchError, match="damaged"):
+            blind_key.open_key(folder, "")
+
+
+def test_a_kind_that_there_is_not_is_told(tmp_path):
+    with pytest.raises(AirTouchError, match="mas: no kind"):
+        blind.make(tmp_path / "set", 3, kinds=["mass", "mas"])
+    assert not (tmp_path / "set").exists()
+
+
+def test_too_few_nominal_flights_are_told(monkeypatch):
+    monkeypatch.setattr(blind, "flown", lambda *_, **__: iter([None] * 20))
+    with pytest.raises(AirTouchError, match="0 end well, fewer than 2"):
+        blind.nominal(None, 0, 2, 0)

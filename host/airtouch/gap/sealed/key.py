@@ -121,7 +121,12 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
         raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
     opened = folder / OPENED
     if opened.exists():
-        if json.loads(opened.read_text(encoding="utf-8")).get("answers_sha256") != answers:
+        try:
+            scored = json.loads(opened.read_text(encoding="utf-8"))["answers_sha256"]
+        except (OSError, ValueError, KeyError, TypeError):
+            raise AirTouchError(f"{opened}: damaged, so nobody knows which answers the key was opened for; make a new "
+                                "set to answer again") from None
+        if scored != answers:
             raise AirTouchError(f"{opened}: the key was opened for other answers; make a new set to answer again")
     else:
         write_bytes(_json({"answers_sha256": answers}), opened, False)

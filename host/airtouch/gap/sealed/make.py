@@ -65,10 +65,12 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
 
-    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError when there is a set, a
-    key or a flight already and `force` is not given, but for flights of a set that was broken off.
+    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError for others, and when there
+    is a set, a key or a flight already and `force` is not given, but for flights of a set that was broken off.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
+    if strange := sorted(set(kinds or ()) - set(KINDS)):
+        raise AirTouchError(f"{', '.join(strange)}: no kind of effect that is drawn; there are {', '.join(KINDS)}")
     _clear(out, key, force)
     vehicle = load(VEHICLE)
     write_bytes((resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes(), out / "vehicle.toml", True)
@@ -127,9 +129,13 @@ def stripped(log: FlightLog) -> FlightLog:
 
 
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
-    """Flights free of effects that end well, from a number on."""
-    logs = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
-    return [stripped(log) for log in islice((x for x in logs if isinstance(x, FlightLog)), count)]
+    """Flights free of effects that end well, from a number on; AirTouchError is raised where too few of them do."""
+    flights = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
+    logs = [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
+    if len(logs) < count:
+        raise AirTouchError(f"{SCENARIO}: of {MOST_FLOWN * count} flights without an effect {len(logs)} end well, "
+                            f"fewer than {count}")
+    return logs
 
 
 def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, progress: Say = lambda _: None,
