@@ -122,8 +122,8 @@ def diagnose_cases(cases: list[Case], store: Path | None, jobs: int) -> list[Res
 
 def identity(case: Case) -> Result:
     """What tells the result of a case from others: its flight, what it is held against, what is left out, the code."""
-    return {"code": code_digest().hex()[:16], "row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
-            "partner": len(case.partner), "left_out": list(case.left_out),
+    return {"code": code_digest().hex()[:16], "row": case.row, "flight": Path(case.flight).name,
+            "baseline": len(case.baseline), "partner": len(case.partner), "left_out": list(case.left_out),
             "against": [Path(file).name for file in (*case.baseline, *(p for p, _ in case.partner))]}
 
 

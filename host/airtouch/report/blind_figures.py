@@ -37,6 +37,8 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
     for level in SEVERITIES:
         shown += [(f"top-1, {level} severity", f"by_severity/{level}/top_1"),
                   (f"test for the true effect at its true strength, {level} severity", f"by_severity/{level}/ideal")]
+    shown += [(f"{level} severity: less than that, as no more is plausible", f"by_severity/{level}/capped")
+              for level in SEVERITIES[1:]]
     shown += [("exact set, single effects", "exact"), ("false alarms, no effect", "false_alarms"),
               ("pairs: exact set", "pairs_exact"), ("pairs: one right", "pairs_one_right")]
     for group in left_out:

@@ -299,6 +299,17 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
         (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
 
 
+def test_flights_are_counted_whose_kind_has_no_strength_four_times_the_weakest():
+    """Mass up to 0.2 where 0.1 can be seen, and a kind with room to spare."""
+    strengths = {"mass": three_severities(0.1, 0.2), "inertia": three_severities(0.1, 1.0)}
+    flights = {f"{name} {level}": blind_key.DrawnFlight((blind_key.DrawnEffect(name, name, level, {"fraction": x}),))
+               for name, three in strengths.items() for level, x in enumerate(three)}
+    figures = blind_score.figures(blind_key.Key(flights, strengths), [])
+    for level in ("2x", "4x"):
+        capped = figures["by_severity"][level]["capped"]
+        assert (capped["hits"], capped["n"]) == (1, 2)
+
+
 def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():
     def case(**nats):
         return {"ranking": [{"name": n, "nats": x} for n, x in nats.items()]}

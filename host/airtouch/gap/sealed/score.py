@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
-from airtouch.gap.sealed.severity import SEEN
+from airtouch.gap.sealed.severity import FACTORS, SEEN
 from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
@@ -33,6 +33,7 @@ GOALS = {
     "parameters/error": "at most 10 %",
     "parameters/coverage": "87 to 93 %",
 }
+ROUNDED = 1e-9  #: relative difference of two strengths that are the same
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
 
@@ -124,12 +125,12 @@ def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
 
 
 def by_severity(sheet: Sheet) -> dict[str, Any]:
-    """For each severity of single effects: top_1, top_3, how often `none` is said, and `ideal`."""
+    """For each severity of single effects: top_1, top_3, how often `none` is said, `ideal`, and `capped`."""
     groups = {name: [n for n, e in sheet.single_effect.items() if e.level == i] for i, name in enumerate(SEVERITIES)}
     return {name: {"top_1": share(sheet.is_first[n] for n in group),
                    "top_3": share(sheet.in_first_three[n] for n in group),
                    "none": share(_verdict(sheet.full_registry.get(n)) == "none" for n in group),
-                   "ideal": ideal(sheet.key, group)}
+                   "ideal": ideal(sheet.key, group), "capped": capped(sheet, group)}
             for name, group in groups.items() if group}
 
 
@@ -169,6 +170,15 @@ def misses(sheet: Sheet) -> list[dict[str, Any]]:
 def ideal(key: Key, flights: Sequence[str]) -> Figure:
     """How many flights a test for the true effect at its true strength sees; n: of those whose nats the key has."""
     return share(nats > SEEN for n in flights if (nats := key.flights[n].nats) is not None)
+
+
+def capped(sheet: Sheet, flights: Sequence[str]) -> Figure:
+    """How many flights have a kind whose strongest severity is less than four times the weakest: no more is plausible.
+
+    n: of those whose strengths the key has.
+    """
+    strengths = [s for n in flights if (s := sheet.key.severities.get(sheet.single_effect[n].kind))]
+    return share(s[2] < (1.0 - ROUNDED) * FACTORS[2] * s[0] for s in strengths)
 
 
 def top(case: Answer | None, name: str, first: int) -> bool:
