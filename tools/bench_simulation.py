@@ -119,7 +119,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--flights", type=whole_number(1), default=64, help="of each round (default %(default)s)")
     parser.add_argument("--workers", type=whole_number(1), default=batch.available_cores(),
-                        help="processes (default: one a core)")
+                        help="threads (default: one a core)")
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--force", action="store_true", help="replace --json if it is there")
     parser.add_argument("--crazyflow", metavar="PYTHON", help="a Python that has crazyflow")

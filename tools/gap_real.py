@@ -27,7 +27,8 @@ the same height at the same angle; those that have none are left out.
 
 --leave-out: flights with an effect alone, each without its effect among the candidates. `unknown` is right.
 
-A flight that the diagnosis refuses is counted as `refused` and not kept: the next run tries it again.
+A flight that the diagnosis refuses is counted as `refused` and not kept: the next run tries it again. What --keep holds
+of another version of the package is not used: those flights are diagnosed anew, and the new results appended.
 """
 
 import argparse
@@ -47,6 +48,7 @@ from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.nominal.kept_scatter import code_digest
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.logs import read
@@ -91,10 +93,15 @@ def diagnose_case(case: Case) -> Result:
 
 
 def quick(cases: list[Case]) -> list[Case]:
-    """The first few of each row and truth that QUICK names, evenly chosen."""
+    """The first few of each row and truth that QUICK names, evenly chosen.
+
+    Raises AirTouchError where there are fewer.
+    """
     out = []
     for (row, truth), many in QUICK.items():
         alike = [c for c in cases if c.row == row and c.truth == truth]
+        if len(alike) < many:
+            raise AirTouchError(f"{row}: {len(alike)} flights of {truth}, and --quick needs {many}")
         out += alike[::max(len(alike) // many, 1)][:many]
     return out
 
@@ -114,17 +121,15 @@ def diagnose_cases(cases: list[Case], store: Path | None, jobs: int) -> list[Res
 
 
 def identity(case: Case) -> Result:
-    """What tells the result of a case from others: its flight, what it is held against, what is left out."""
-    return {"row": case.row, "flight": Path(case.flight).name, "baseline": len(case.baseline),
-            "partner": len(case.partner), "left_out": list(case.left_out),
+    """What tells the result of a case from others: its flight, what it is held against, what is left out, the code."""
+    return {"code": code_digest().hex()[:16], "row": case.row, "flight": Path(case.flight).name,
+            "baseline": len(case.baseline), "partner": len(case.partner), "left_out": list(case.left_out),
             "against": [Path(file).name for file in (*case.baseline, *(p for p, _ in case.partner))]}
 
 
 def _key(result: Result) -> tuple:
-    """The `identity` of a result as a key. Files of before 2026-11-26 do not say what a flight was held against: such
-    a result fits only a case without a baseline.
-    """
-    return (result["row"], result["flight"], result["baseline"], result.get("partner", 0),
+    """The `identity` of a result as a key; files of before 2026-11-27 do not say of which code, and fit no case."""
+    return (result.get("code"), result["row"], result["flight"], result["baseline"], result.get("partner", 0),
             tuple(result.get("left_out", ())), tuple(result.get("against", ())))
 
 

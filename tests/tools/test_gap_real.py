@@ -53,6 +53,22 @@ def test_a_kept_result_is_that_of_the_same_baseline_partners_and_candidates(tmp_
     assert diagnosed == asked, "each once"
 
 
+def test_a_result_of_another_version_of_the_code_is_none(tmp_path, diagnosed, monkeypatch):
+    case, store = cases.Case("swarm", "none", "v", "a.csv", ()), tmp_path / "results.jsonl"
+    for code in (b"one", b"another", b"one"):
+        monkeypatch.setattr(gap_real, "code_digest", lambda code=code: code)
+        gap_real.diagnose_cases([case], store, 1)
+    assert len(diagnosed) == 2
+
+
+def test_quick_needs_a_flight_of_each_of_its_kinds():
+    every = [cases.Case(row, truth, "v", f"{i}.csv", ()) for (row, truth), n in gap_real.QUICK.items()
+             for i in range(n)]
+    assert len(gap_real.quick(every)) == sum(gap_real.QUICK.values())
+    with pytest.raises(AirTouchError, match="swarm: 0 flights of ground_effect"):
+        gap_real.quick(every[1:])
+
+
 def test_a_refusal_is_not_kept_and_one_that_was_kept_is_no_result(tmp_path, diagnosed):
     case, store = cases.Case("swarm", "none", "v", "a.csv", ()), tmp_path / "results.jsonl"
     diagnosed.verdict = "refused"

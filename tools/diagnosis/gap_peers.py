@@ -8,6 +8,7 @@ Names of one thing (`alike.ALIKE`) count as one. Its figures are in host/docs/ga
 
 import argparse
 import os
+import statistics
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -82,9 +83,9 @@ def summary(results: Sequence[PeerResult]) -> str:
     right = [r for r in results if r.within(1) and r.shrink is not None]
     if not right:
         return text
-    shrinks = sorted(r.shrink for r in right if r.shrink is not None)
+    shrinks = [r.shrink for r in right if r.shrink is not None]
     controls = [r.control for r in right if r.control is not None]
-    return (f"{text}\ngap closed with the right effect: median {shrinks[len(shrinks) // 2]:.2f}, "
+    return (f"{text}\ngap closed with the right effect: median {statistics.median(shrinks):.2f}, "
             f">= {GOAL:.2f} in {sum(s >= GOAL for s in shrinks)} of {len(shrinks)}"
             + (f"; with a wrong one at most {max(controls):.2f}" if controls else ""))
 

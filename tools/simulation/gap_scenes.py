@@ -20,7 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.arguments import whole_number
-from airtouch.errors import in_one_line
+from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.sealed.intervals import share_text
 from airtouch.gap.sealed.make import VEHICLE, stripped
@@ -36,10 +36,13 @@ EFFECTS = ("mass:fraction=0.12", "com_offset:x=0.002m", "wind:x=0.4m/s", "motor_
 
 
 def flown(scene: str, count: int, seed: int, effect: str = "") -> list[FlightLog]:
-    """So many flights that end well, without what the simulator alone knows."""
+    """So many flights that end well, without what the simulator alone knows; AirTouchError where there are fewer."""
     pairs = [effects.parse(effect)] if effect else []
     flights = batch.flights(scene, range(3 * count), vehicle=VEHICLE, effects=pairs, seed=seed, workers=1)
-    return [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
+    logs = [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
+    if len(logs) < count:
+        raise AirTouchError(f"{scene} {effect}: of {3 * count} flights {len(logs)} end well, fewer than {count}")
+    return logs
 
 
 def answers(task: tuple[str, int, int]) -> list[tuple[str, str, float]]:

@@ -32,10 +32,13 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
 
     left_out: groups of flights whose effect was left out, keys of the score's `unknown`.
     """
-    shown = [("top-1, single effects", "top_1"), ("top-3, single effects", "top_3")]
+    shown = [("top-1, single effects", "top_1"), ("top-3, single effects", "top_3"),
+             ("right rotor or loop, where the first answer is right", "right_variant")]
     for level in SEVERITIES:
         shown += [(f"top-1, {level} severity", f"by_severity/{level}/top_1"),
                   (f"test for the true effect at its true strength, {level} severity", f"by_severity/{level}/ideal")]
+    shown += [(f"{level} severity: less than that, as no more is plausible", f"by_severity/{level}/capped")
+              for level in SEVERITIES[1:]]
     shown += [("exact set, single effects", "exact"), ("false alarms, no effect", "false_alarms"),
               ("pairs: exact set", "pairs_exact"), ("pairs: one right", "pairs_one_right")]
     for group in left_out:
@@ -70,7 +73,7 @@ def _in_words(figure: Mapping[str, Any]) -> str:
 
 
 def effect_rows(score: Mapping[str, Any]) -> Rows:
-    """Rows (effect, top-1, top-3, median parameter error), one for each kind of effect."""
+    """Rows (effect, top-1, top-3, median parameter error), one for each kind of effect, right by the effect's name."""
     out: Rows = []
     for kind, part in score["by_effect"].items():
         error = score["parameters"]["by_effect"].get(kind)

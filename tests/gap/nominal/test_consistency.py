@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.flights.flight import ready
+from airtouch.gap.nominal import consistency
 from airtouch.gap.nominal.consistency import (
     FAR,
     FAR_SIMULATED,
@@ -85,11 +86,24 @@ def test_flights_stay_where_more_than_one_in_three_is_unlike():
 
 
 def test_a_note_names_the_channel_in_which_a_flight_is_odd():
-    flights = baseline(0.0, 0.01, -0.01, 0.02, 0.12)
-    (note,) = odd_flights(study(), flights)
-    assert note.startswith("lift 0.12: declared nominal, yet its lift is") and note.endswith("from the others'")
-    assert not odd_flights(study(), baseline(0.0, 0.01, -0.01, 0.02, 0.05))
+    """The distance by Student's t of three degrees of freedom, whose two tails beyond 18.7 hold 1 % over 30 trims."""
+    (note,) = odd_flights(study(), baseline(0.0, 0.01, -0.01, 0.02, 0.45))
+    assert note.startswith("lift 0.45: declared nominal, yet its lift is") and note.endswith("from the others'")
+    assert not odd_flights(study(), baseline(0.0, 0.01, -0.01, 0.02, 0.35))  # no more than nominal flights may differ
+    assert not odd_flights(study(), baseline(0.0, 0.1, -0.1, 0.2, 0.5))  # far, but within chance
     assert not odd_flights(study(), baseline(0.0, 5.0))
+
+
+@pytest.mark.parametrize("flights", [3, 4, 5, 6])
+def test_of_a_hundred_sets_of_normal_trims_one_gets_a_note(monkeypatch, flights):
+    """Six independent channels that scatter by ten times the least distance, so that chance alone decides."""
+    rng, noted = np.random.default_rng(flights), 0
+    some = baseline(*np.zeros(flights))
+    for _ in range(2000):
+        trim = rng.normal(0.0, 10.0 * FAR, (flights, 6))
+        monkeypatch.setattr(consistency, "trims", lambda *_, trim=trim: trim)
+        noted += bool(odd_flights(study(), some))
+    assert 0.004 < noted / 2000 < 0.016  # 1 % and three standard errors, less for two odd ones in a set
 
 
 def test_differences_beyond_what_nominal_flights_may_differ_are_said():

@@ -1,5 +1,7 @@
 """What a library is learned by, on draws of a known covariance; a small library, learned from few flights; its file."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from airtouch.gap.relations.build import (
     LEAST_NAMELESS_LENGTH,
     PairedFlights,
     Whitening,
+    _interaction,
     loadings_beyond_noise,
     nameless_loadings,
 )
@@ -51,6 +54,12 @@ def test_two_effects_interact_in_the_direction_that_stands_over_noise():
     loadings = loadings_beyond_noise(noise + 0.3 * rng.normal(size=(300, 1)) * direction, 0.05 ** 2)
     assert loadings.shape == (40, 1)
     assert abs(loadings[3, 0]) == pytest.approx(0.3, rel=0.1)
+
+
+def test_pairs_of_which_none_can_be_used_have_no_interaction():
+    """No flight was made, as where all of two effects crash."""
+    coordinates = SimpleNamespace(projection=np.zeros((9, 4)))
+    assert _interaction(None, coordinates, None, [], 0).shape == (4, 0)
 
 
 def test_nameless_disturbances_scatter_by_their_directions_not_their_lengths():

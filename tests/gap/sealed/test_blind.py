@@ -73,8 +73,9 @@ def test_diagnosis_names_clear_effects(blind_check):
 def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch):
     """Also for those beyond the ten thousandth, whose names are longer."""
     names, opened = ["flight_1000", "flight_10000"], []
-    for name in ("sealed.json", *(f"{n}.csv.gz" for n in names)):
-        (tmp_path / name).touch()
+    (tmp_path / "sealed.json").write_text(json.dumps({"key_sha256": "", "flights": 2}))
+    for name in names:
+        (tmp_path / f"{name}.csv.gz").touch()
 
     def answer(folder, answers, cases, *_):
         answers.mkdir(exist_ok=True)
@@ -269,6 +270,44 @@ def test_scores_in_closed_form():
     assert figures["confusion"]["none"] == {"none": 1, "unknown": 1}
     with pytest.raises(AirTouchError, match="not a flight of this set"):
         blind_score.figures(key, [answer("z", "none", [("none", 1.0)])])
+
+
+def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
+    """Rotor 1 called 3, the rate's gain called the height's, and each rightly; mass has no variants."""
+    free, fixed = {"value": 0.2, "low": 0.1, "high": 0.3, "unit": "1"}, {"value": 1.0, "unit": "1"}
+
+    def truth(name, kind, values):
+        return {"effects": [{"name": name, "kind": kind, "level": 0, "values": values}]}
+
+    def motor(rotor):
+        return {"thrust_loss": free, "rotor": {"value": rotor, "unit": "1"}}
+
+    def gain(loop):
+        return {name: free if name == loop else fixed for name in ("rate", "attitude", "position", "height")}
+
+    weak = truth("weak_motor", "weak_motor", {"rotor": 1.0, "thrust_loss": 0.2})
+    rate = truth("controller_gain", "controller_gain rate", {"rate": 1.2})
+    flights = {"a": (weak, motor(3.0)), "b": (weak, motor(1.0)), "c": (rate, gain("height")),
+               "d": (rate, gain("rate")), "e": (truth("mass", "mass", {"fraction": 0.1}), {"fraction": free})}
+    key = blind_key.key_from({"answers": {n: true for n, (true, _) in flights.items()}})
+    cases = [answer(n, "effect", [(name, 1.0)], [(name, q)]) for n, (true, q) in flights.items()
+             for name in [true["effects"][0]["name"]]]
+    figures = blind_score.figures(key, cases)
+    assert figures["top_1"]["hits"] == 5
+    assert (figures["right_variant"]["hits"], figures["right_variant"]["n"]) == (2, 4)
+    assert ("right rotor or loop, where the first answer is right", "4") in {
+        (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
+
+
+def test_flights_are_counted_whose_kind_has_no_strength_four_times_the_weakest():
+    """Mass up to 0.2 where 0.1 can be seen, and a kind with room to spare."""
+    strengths = {"mass": three_severities(0.1, 0.2), "inertia": three_severities(0.1, 1.0)}
+    flights = {f"{name} {level}": blind_key.DrawnFlight((blind_key.DrawnEffect(name, name, level, {"fraction": x}),))
+               for name, three in strengths.items() for level, x in enumerate(three)}
+    figures = blind_score.figures(blind_key.Key(flights, strengths), [])
+    for level in ("2x", "4x"):
+        capped = figures["by_severity"][level]["capped"]
+        assert (capped["hits"], capped["n"]) == (1, 2)
 
 
 def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():

@@ -72,6 +72,18 @@ def test_the_floor_of_an_offset_is_its_standard_deviation_between_flights():
     assert level[0, 0, 0] == pytest.approx(1.1)
 
 
+@pytest.mark.parametrize("flights", [2, 3, 6])
+def test_what_varies_within_a_flight_counts_once_in_the_floor_of_an_offset(flights):
+    """Blocks at a mean of the flight +- 0.5: 0.5^2, and the sample variance of the flights' means."""
+    means = np.random.default_rng(7).normal(3.0, 0.3, flights)
+    sums = blocks_of(np.random.default_rng(3), flights, 6, offsets=means)
+    values = means[sums.flight] + np.where(np.arange(len(sums.flight)) % 2, 0.5, -0.5)
+    sums.mean[:, 0] = 200 * values[:, None]
+    sums.power[:, 0, 0] = 200 * values[:, None] ** 2
+    level, _ = cell_tables.floors_of(sums, np.full((len(MAP_BANDS_HZ), COUNT), 0.01))[AIRBORNE]
+    assert level[0, 0, 0] ** 2 == pytest.approx(0.25 + np.var(means, ddof=1))
+
+
 def test_the_floor_of_a_phase_that_few_flights_have_is_that_of_those_few():
     """Two of six flights: their sample standard deviation, over one flight less than two."""
     offsets = np.array([3.1, 2.7, 3.4, 2.9, 3.0, 3.3])

@@ -43,6 +43,7 @@ def test_the_gap_closed_counts_where_the_first_answer_is_right():
     first, last = gap_peers.summary(results).splitlines()
     assert first == f"first answer {share(4, 5)}; first three {share(5, 5)} (95 % intervals)"
     assert last == "gap closed with the right effect: median 0.90, >= 0.80 in 2 of 3; with a wrong one at most 0.10"
+    assert "median 0.80," in gap_peers.summary([result(["mass"], 0.9), result(["mass"], 0.7)])
     assert len(gap_peers.summary(results[3:]).splitlines()) == 1
 
 

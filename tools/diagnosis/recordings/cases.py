@@ -40,13 +40,13 @@ class Case:
 
 def authors(folder: Path, part: str) -> Iterator[Case]:
     """Nominal flights of the authors against five others of the same day and condition."""
-    for files in _calm_groups(folder, part).values():
+    for (day, *height_and_angle), files in _calm_groups(folder, part).items():
         if len(files) <= OTHERS:
             continue
         step = max(len(files) // PER_GROUP, 1)
         for flight in files[::step][:PER_GROUP]:
             others = [f for f in files if f != flight][:OTHERS]
-            yield Case("authors", "none", DEFAULT_VEHICLE, flight, tuple(others))
+            yield Case("authors", "none", DEFAULT_VEHICLE, flight, tuple(others), unit=tuple(height_and_angle), day=day)
 
 
 def swarm(folder: Path, part: str) -> Iterator[Case]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
@@ -92,10 +93,13 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
     make_folder(out)
     if not (out / "sealed.json").exists():
         click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
+    source = click.get_current_context().get_parameter_source
+    asked = [None if source(name) == ParameterSource.DEFAULT else value
+             for name, value in (("flights", flights), ("seed", seed))]
     with Bar() as bar:
         from airtouch.gap.sealed import run as check
 
-        figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
+        figures = check.run(out, *asked, workers=workers, mapper=spread, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 
@@ -107,7 +111,7 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     from airtouch.report import blind_figures
 
     for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.score_rows(figures)),
-                        (("effect", "top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
+                        (("kind", "effect in top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
         table = Table(*heads)
         for row in rows:
             table.add_row(*row)

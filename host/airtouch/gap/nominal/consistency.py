@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from scipy.special import stdtrit
 
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import GROUND, Flight
@@ -23,6 +24,7 @@ TRIM = slice(0, TORQUE.stop)  #: channels of force and torque, m/s^2 and rad/s^2
 FEWEST_FLIGHTS = 3  #: flights of which one can be unlike the others
 #: robust standard deviations off the others' median beyond which a flight's trim is odd; chosen
 ODD = 6.0
+FALSE_NOTES = 0.01  #: share of sets of normal trims in which a flight is called odd, at most; chosen
 MOST_LEFT_OUT = 3  #: at most one flight in so many is left out; where more are odd, the flights disagree and all count
 #: distance off the median, m/s^2 and rad/s^2, from which an odd flight is left out; chosen
 FAR = np.array([0.3, 0.3, 0.4, 5.0, 5.0, 5.0])
@@ -72,14 +74,27 @@ def of_one_trim(vehicle: Vehicle, flights: Sequence[Flight]) -> bool:
 
 
 def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
-    """A note on each flight whose trim under the calibrated vehicle is odd, with the channel in which it is most so."""
-    if len(flights) < FEWEST_FLIGHTS:
+    """A note on each flight whose trim under the calibrated vehicle is odd, with the channel in which it is most so.
+
+    Its distance from the others' mean is beyond what a further normal one has, in FALSE_NOTES of such sets, and beyond
+    FAR (of simulated flights FAR_SIMULATED).
+    """
+    n = len(flights)
+    if n < FEWEST_FLIGHTS:
         return []
     trim = trims(flights, study.vehicle, study.calibration)
-    distance = np.abs(trim - np.median(trim, axis=0)) / np.maximum(deviation(trim), 1e-9)
+    limit = float(stdtrit(n - 2, 1.0 - 0.5 * FALSE_NOTES / trim.size))
     words = [CHANNEL_WORDS[c.name] for c in CHANNELS[TRIM]]
-    return [f"{f.name}: declared nominal, yet its {words[int(np.argmax(d))]} is {d.max():.0f} standard deviations "
-            "from the others'" for f, d in zip(flights, distance, strict=True) if d.max() > ODD]
+    least = (FAR_SIMULATED if study.simulated else FAR) / limit
+    notes = []
+    for i, f in enumerate(flights):
+        others = np.delete(trim, i, axis=0)
+        error = others.std(axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / (n - 1))  # of the difference to their mean
+        d = np.abs(trim[i] - others.mean(axis=0)) / np.maximum(error, least)
+        if d.max() > limit:
+            notes.append(f"{f.name}: declared nominal, yet its {words[int(np.argmax(d))]} is {d.max():.0f} standard "
+                         "deviations from the others'")
+    return notes
 
 
 def differences(study: Study, flights: Sequence[Flight]) -> list[str]:

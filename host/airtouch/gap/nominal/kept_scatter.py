@@ -95,7 +95,7 @@ def _pair(values: Any) -> tuple[float, float]:
 
 def key_of(vehicle: Vehicle, flights: Sequence[Flight], without: Sequence[str]) -> str:
     """A name that is another one where anything differs that the scatter of these flights depends on."""
-    digest = hashlib.sha256(_code())
+    digest = hashlib.sha256(code_digest())
     firmware = Path(vehicle.firmware)  # a release's name, or a file of its own
     digest.update(repr((vehicle, sorted(without), firmware.read_bytes() if firmware.is_file() else b"")).encode())
     for flight in flights:
@@ -117,7 +117,7 @@ def _parts(flight: Flight) -> Iterator[Any]:
 
 
 @cache
-def _code() -> bytes:
+def code_digest() -> bytes:
     """Digest of the package's files, and of the versions of what it works with."""
     package = Path(__file__).resolve().parents[2]
     digest = hashlib.sha256(repr((platform.machine(), platform.python_version(),

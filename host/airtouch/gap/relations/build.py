@@ -187,6 +187,8 @@ def _interaction(scene: Scene, coordinates: Coordinates, additive: LearnedModel,
             noise.append(smaller ** -2.0)
             if np.linalg.norm(residual) < smaller:  # else the strengths found are not the right ones
                 relative.append(residual / smaller)
+    if not relative:  # no pair shows one
+        return np.zeros((coordinates.projection.shape[1], 0))
     return loadings_beyond_noise(np.array(relative), float(np.mean(noise)))
 
 

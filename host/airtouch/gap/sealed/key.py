@@ -11,6 +11,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
 SEALED, OPENED = "sealed.json", "opened.json"  #: files in the folder of a set: the key's hash; that of the answers
+ANSWERS = "answers"  #: folder in it that `run` writes the diagnoses to
 
 
 @dataclass(frozen=True)
@@ -81,6 +82,24 @@ def seal(folder: Path, path: Path, key: Key, calibration_flights: int) -> None:
     write_bytes(_json(sealed, indent=1), folder / SEALED, True)
 
 
+def sealed_in(folder: Path) -> dict[str, Any]:
+    """What `seal` wrote into the folder of a set; raises AirTouchError where it is not there."""
+    try:
+        sealed = json.loads((folder / SEALED).read_text(encoding="utf-8"))
+        return {"key_sha256": sealed["key_sha256"], "flights": sealed["flights"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
+                            "`airtouch gap blind make`") from None
+
+
+def seed_of(folder: Path) -> int | None:
+    """The seed of a set, by the key beside it, of which no more is read; None where there is no such key."""
+    try:
+        return json.loads(key_of(folder).read_text(encoding="utf-8"))["seed"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def answers_sha256(cases: Sequence[Mapping[str, Any]]) -> str:
     """The hash of some diagnoses, by which it is known whether others were scored before."""
     return hashlib.sha256(json.dumps(cases, sort_keys=True).encode()).hexdigest()
@@ -93,11 +112,7 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
     changed or cannot be read, and when other answers are already scored: who has seen the key cannot answer blindly.
     """
     folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
-    try:
-        sealed = json.loads((folder / SEALED).read_text(encoding="utf-8"))["key_sha256"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise AirTouchError(f"{folder}: no sealed.json of a blind set; make one with "
-                            "`airtouch gap blind make`") from None
+    sealed = sealed_in(folder)["key_sha256"]
     try:
         content = key.read_bytes()
     except OSError as error:
@@ -106,7 +121,12 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
         raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
     opened = folder / OPENED
     if opened.exists():
-        if json.loads(opened.read_text(encoding="utf-8")).get("answers_sha256") != answers:
+        try:
+            scored = json.loads(opened.read_text(encoding="utf-8"))["answers_sha256"]
+        except (OSError, ValueError, KeyError, TypeError):
+            raise AirTouchError(f"{opened}: damaged, so nobody knows which answers the key was opened for; make a new "
+                                "set to answer again") from None
+        if scored != answers:
             raise AirTouchError(f"{opened}: the key was opened for other answers; make a new set to answer again")
     else:
         write_bytes(_json({"answers_sha256": answers}), opened, False)

@@ -4,6 +4,7 @@ A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` f
 `sealed.json` with the SHA-256 of the key (`key`). The key lies apart, in `FOLDER.key.json` beside the folder.
 """
 
+import re
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
@@ -17,7 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.key import OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
+from airtouch.gap.sealed.key import ANSWERS, OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
 from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
@@ -39,6 +40,8 @@ AT_ONCE = 4  #: kinds of effects whose severities two processes share at a time;
 MOST_FLOWN = 10  #: flights flown for each that is to end well; chosen
 TRIES, WEAKER = 20, 0.9  #: flights drawn anew after a crash, each with so much of the strength; chosen
 NONE_FIRST, CAL_FIRST = 800_000, 700_000  #: numbers of flights for the severities, and to calibrate on
+UNSEALED = "unsealed"  #: file in the folder of a set that is being made; what is left of one that was broken off
+OWN_NAME = re.compile(r"(flight|cal)_\d+\.csv\.gz")  #: of the flights of a set
 Say = Callable[[str], None]
 Severities = Mapping[str, Sequence[float]]  #: of each kind of effect, its three strengths in rising order
 
@@ -62,10 +65,12 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
          kinds: Sequence[str] | None = None, progress: Say = lambda _: None) -> Path:
     """Write a sealed set to the folder `out` and its key apart; returns the key's path.
 
-    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError when
-    there is a set or a key already and `force` is not given.
+    kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError for others, and when there
+    is a set, a key or a flight already and `force` is not given, but for flights of a set that was broken off.
     """
     out, key = Path(out), Path(key) if key else key_of(Path(out))
+    if strange := sorted(set(kinds or ()) - set(KINDS)):
+        raise AirTouchError(f"{', '.join(strange)}: no kind of effect that is drawn; there are {', '.join(KINDS)}")
     _clear(out, key, force)
     vehicle = load(VEHICLE)
     write_bytes((resources.files("airtouch") / "vehicles" / f"{VEHICLE}.toml").read_bytes(), out / "vehicle.toml", True)
@@ -86,17 +91,27 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
         flown_with[name] = DrawnFlight(effects, _log_ratio_of_one(study, log, effects))
     drawn = {"salt": secrets.token_hex(16), "seed": seed, "scenario": SCENARIO, "vehicle": VEHICLE}
     seal(out, key, Key(flown_with, plan.severities, drawn), CAL)
+    (out / UNSEALED).unlink()
     return key
 
 
 def _clear(out: Path, key: Path, force: bool) -> None:
-    """Make the folder of a set; with force the flights of an older one are deleted, else AirTouchError is raised."""
+    """Make the folder of a set; the flights of one that was broken off are deleted, with force those of any set.
+
+    The seal and the key go first: of a set that is broken off later nothing is left to score it by. Raises
+    AirTouchError where there is a set, a key or a flight and neither is the case.
+    """
     for path in (out / SEALED, key):
         if path.exists() and not force:
             raise AirTouchError(f"{path}: exists already; use --force to replace it")
     out.mkdir(parents=True, exist_ok=True)
-    for old in [*out.glob("flight_*"), *out.glob("cal_*"), *out.glob(OPENED)] if force else []:
-        old.unlink()
+    old = [path for path in out.iterdir() if OWN_NAME.fullmatch(path.name)]
+    if old and not force and not (out / UNSEALED).exists():
+        raise AirTouchError(f"{out}: flights of no sealed set are in it; choose another folder, or replace them with "
+                            "`airtouch gap blind make --force`")
+    for path in (out / SEALED, key, out / OPENED, *old, *(out / ANSWERS).glob("flight_*.json")):
+        path.unlink(missing_ok=True)
+    write_bytes(b"", out / UNSEALED, True)
 
 
 def _log_ratio_of_one(study: Study, log: FlightLog, effects: Sequence[DrawnEffect]) -> float | None:
@@ -114,9 +129,13 @@ def stripped(log: FlightLog) -> FlightLog:
 
 
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
-    """Flights free of effects that end well, from a number on."""
-    logs = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
-    return [stripped(log) for log in islice((x for x in logs if isinstance(x, FlightLog)), count)]
+    """Flights free of effects that end well, from a number on; AirTouchError is raised where too few of them do."""
+    flights = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
+    logs = [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
+    if len(logs) < count:
+        raise AirTouchError(f"{SCENARIO}: of {MOST_FLOWN * count} flights without an effect {len(logs)} end well, "
+                            f"fewer than {count}")
+    return logs
 
 
 def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, progress: Say = lambda _: None,

@@ -15,7 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
-from airtouch.gap.sealed.key import SEALED, answers_sha256, open_key
+from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in, seed_of
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.study import Study
@@ -25,6 +25,7 @@ from airtouch.simulation.workers.in_order import in_order
 from airtouch.vehicle import load
 
 Mapper = Callable[[Callable, Iterable], Iterable]
+FLIGHTS, SEED = 480, 0  #: of a set by default
 AHEAD = 4  #: flights sent to each process and not yet back; chosen
 #: fields of a diagnosis that an answer has
 ANSWERED = ("flights", "without", "verdict", "effects", "ranking", "indistinguishable", "gap", "shrink", "control")
@@ -49,19 +50,28 @@ class Answer(NamedTuple):
     text: str
 
 
-def run(out: Path, flights: int = 480, seed: int = 0, *, workers: int = 2, unknown: int | None = None,
+def run(out: Path, flights: int | None = None, seed: int | None = None, *, workers: int = 2, unknown: int | None = None,
         mapper: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `score.figures`.
 
-    unknown: how many single flights are diagnosed once more without their effect, all by default. mapper: what
-    stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about 4 s of
-    one core for each flight, once more for each single one.
+    flights, seed: of the set, FLIGHTS and SEED by default; AirTouchError is raised where a set that is there has others
+    than are given. unknown: how many single flights are diagnosed once more without their effect, all by default.
+    mapper: what stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about
+    4 s of one core for each flight, once more for each single one.
     """
     out = Path(out)
     if not (out / SEALED).exists():
-        make.make(out, flights, seed, progress=progress)
-    answers = out / "answers"
+        make.make(out, FLIGHTS if flights is None else flights, SEED if seed is None else seed, progress=progress)
+    answers = out / ANSWERS
     names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
+    sealed = sealed_in(out)["flights"]
+    for what, asked, there in (("flights", flights, sealed), ("seed", seed, seed_of(out))):
+        if None not in (asked, there) and asked != there:
+            raise AirTouchError(f"{out}: a sealed set with {what} {there} is there, not {asked}; leave the option out, "
+                                "or choose another folder")
+    if len(names) != sealed:
+        raise AirTouchError(f"{out}: {len(names)} flights, but {sealed} were sealed; make the set anew with "
+                            "`airtouch gap blind make --force`")
     study = study_in(out)
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, mapper)
     # the key is opened for these answers; effects can be withheld only when they are known

@@ -13,7 +13,8 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
-from airtouch.gap.sealed.severity import SEEN
+from airtouch.gap.sealed.severity import FACTORS, SEEN
+from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
 
@@ -32,6 +33,7 @@ GOALS = {
     "parameters/error": "at most 10 %",
     "parameters/coverage": "87 to 93 %",
 }
+ROUNDED = 1e-9  #: relative difference of two strengths that are the same
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
 
@@ -85,17 +87,20 @@ def read_answers(path: Path) -> list[Answer]:
 def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
     """All figures of a set, JSON-ready. A flight without a diagnosis counts as wrong.
 
+    Right means the effect by name (or another name of it); right_variant says how often its rotor or loop is right too.
+
     flights, diagnosed, effects: numbers of flights, of diagnoses, of effects drawn alone. Of single effects: top_1,
     top_3, exact (named, and nothing else), by_severity, by_effect, misses. Of flights free of effects: false_alarms
     (anything but `none`), false_unknown. Of pairs: pairs_exact, pairs_one_right. The others as the functions of these
-    names say: unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis of a flight
-    that is not in the key.
+    names say: right_variant, unknown, shrink, parameters, confusion, reliability. Raises AirTouchError for a diagnosis
+    of a flight that is not in the key.
     """
     sheet = sheet_of(key, cases)
     answers, single = sheet.full_registry, sheet.single_effect
     return {
         "flights": len(key.flights), "diagnosed": len(answers), "effects": len({e.name for e in single.values()}),
         "top_1": share(sheet.is_first.values()), "top_3": share(sheet.in_first_three.values()),
+        "right_variant": right_variant(sheet),
         "exact": share(same_things(_named(answers.get(n)), [e.name]) for n, e in single.items()),
         "by_severity": by_severity(sheet), "by_effect": by_effect(sheet),
         **of_flights_without_effect(sheet), **of_pairs(sheet),
@@ -120,12 +125,12 @@ def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
 
 
 def by_severity(sheet: Sheet) -> dict[str, Any]:
-    """For each severity of single effects: top_1, top_3, how often `none` is said, and `ideal`."""
+    """For each severity of single effects: top_1, top_3, how often `none` is said, `ideal`, and `capped`."""
     groups = {name: [n for n, e in sheet.single_effect.items() if e.level == i] for i, name in enumerate(SEVERITIES)}
     return {name: {"top_1": share(sheet.is_first[n] for n in group),
                    "top_3": share(sheet.in_first_three[n] for n in group),
                    "none": share(_verdict(sheet.full_registry.get(n)) == "none" for n in group),
-                   "ideal": ideal(sheet.key, group)}
+                   "ideal": ideal(sheet.key, group), "capped": capped(sheet, group)}
             for name, group in groups.items() if group}
 
 
@@ -167,9 +172,29 @@ def ideal(key: Key, flights: Sequence[str]) -> Figure:
     return share(nats > SEEN for n in flights if (nats := key.flights[n].nats) is not None)
 
 
+def capped(sheet: Sheet, flights: Sequence[str]) -> Figure:
+    """How many flights have a kind whose strongest severity is less than four times the weakest: no more is plausible.
+
+    n: of those whose strengths the key has.
+    """
+    strengths = [s for n in flights if (s := sheet.key.severities.get(sheet.single_effect[n].kind))]
+    return share(s[2] < (1.0 - ROUNDED) * FACTORS[2] * s[0] for s in strengths)
+
+
 def top(case: Answer | None, name: str, first: int) -> bool:
     """Whether an effect, or another name of it, is among the first of a ranking."""
     return case is not None and any(interchangeable(name, r["name"]) for r in case["ranking"][:first])
+
+
+def right_variant(sheet: Sheet) -> Figure:
+    """How often the variant is right too: the rotor of an effect of one rotor, the parameter that a kind scales alone.
+
+    n: flights whose single effect has variants, is first and is named.
+    """
+    named = {n: [f for f in sheet.full_registry[n]["effects"] if f["name"] == e.name]
+             for n, e in sheet.single_effect.items() if sheet.is_first[n] and has_variants(e)}
+    return share(any(same_variant(sheet.single_effect[n], f["parameters"]) for f in found)
+                 for n, found in named.items() if found)
 
 
 def unknown(sheet: Sheet) -> dict[str, Any]:

@@ -170,7 +170,10 @@ def student_log_density(x: float, freedom: float, middle: float, spread: float) 
 
 
 def _widest(classes: Sequence[Scatter]) -> Scatter:
-    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known."""
+    """Of every effect the widest scatter of any class: for vehicles of which no nominal flight is known.
+
+    About no strength: what a random effect has on average in flights of a class (`middle`) is left out.
+    """
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
 

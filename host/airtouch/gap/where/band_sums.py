@@ -33,7 +33,14 @@ class Sums:
 
     def of_phase(self, phase: int) -> "Sums":
         """The rows of one phase."""
-        rows = self.phase == phase
+        return self._of(self.phase == phase)
+
+    def of_flight(self, flight: int) -> "Sums":
+        """The rows of one flight."""
+        return self._of(self.flight == flight)
+
+    def _of(self, rows: np.ndarray) -> "Sums":
+        """Some of the rows (b,)."""
         return Sums(self.phase[rows], self.flight[rows], self.weight[rows], self.power[rows], self.mean[rows])
 
     def by_phase(self) -> "Sums":

@@ -171,16 +171,20 @@ def spreads_of(sums: Sums, sensor: np.ndarray) -> Floors:
 def _without_common(nominal: Sums, phase: int) -> Sums | None:
     """The sums of one phase of the baseline without the mean that all its flights share in the lowest band.
 
-    None where no flight has the phase. The mean is that of each regime, and the variance is unbiased: over one flight
-    less than have the regime. Of a regime that one flight has, nothing is left but what varies within that flight.
+    None where no flight has the phase. The mean is that of each regime, and the variance between flights is unbiased:
+    over one flight less than have the regime. What varies within a flight about its own mean counts once. Of a regime
+    that one flight has, nothing else is left.
     """
     part = nominal.of_phase(phase)
     if not len(part.phase):
         return None
-    weight, power, common = part.weight[:, :, None], part.power.copy(), part.offset()
-    spread = power[:, :, 0] - 2.0 * common * part.mean + weight * common ** 2
+    weight, power, common, own = part.weight[:, :, None], part.power.copy(), part.offset(), np.empty_like(part.mean)
+    for flight in np.unique(part.flight):
+        own[part.flight == flight] = part.of_flight(flight).offset()
+    within = power[:, :, 0] - 2.0 * own * part.mean + weight * own ** 2
     count = _long_flights(part)
-    power[:, :, 0] = np.maximum(spread, 0.0) * np.where(count > 1, count / np.maximum(count - 1.0, 1.0), 1.0)
+    unbiased = np.where(count > 1, count / np.maximum(count - 1.0, 1.0), 1.0)
+    power[:, :, 0] = np.maximum(within, 0.0) + weight * (own - common) ** 2 * unbiased
     return replace(part, power=power, mean=part.mean - weight * common)
 
 

@@ -51,6 +51,9 @@ def test_four_of_the_authors_flights_are_held_against_five_calm_ones_of_their_da
     assert names(c.flight for c in cases) == [f"a_b_0125-1200_{i}.csv" for i in (0, 2, 4, 6)]
     assert all(len(c.baseline) == 5 and set(names(c.baseline)) <= {f"a_b_0125-1200_{i}.csv" for i in range(8)}
                for c in cases)
+    assert {(c.unit, c.day) for c in cases} == {(c.unit, c.day) for c in recorded_cases.nominal(folder, "build")
+                                                if c.flight in [x.flight for x in cases]}
+    assert all(c.unit and c.day for c in cases)
     assert not list(recorded_cases.authors(folder, "view"))
 
 
