@@ -1,6 +1,8 @@
 """A folder of simulated flights keeps what the simulator did not write, and may hold damaged files of its own."""
 
 import csv
+import re
+from importlib import resources
 
 import pytest
 from click.testing import CliRunner
@@ -8,7 +10,7 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
-from airtouch.simulation.workers import store
+from airtouch.simulation.workers import cluster, store
 from short_scenario import SHORT
 
 REQUEST = {"scenario": "short", "seed": 3}
@@ -82,3 +84,29 @@ def test_a_damaged_list_of_diverged_flights_is_one_line(tmp_path):
     (tmp_path / store.FAILED).write_bytes(b"\xff\n")
     with pytest.raises(AirTouchError, match="diverged.jsonl: no text in UTF-8"):
         store.failures(tmp_path)
+
+
+def heavy(folder):
+    """A vehicle file of 1 kg, which a Crazyflie's motors do not lift."""
+    text = (resources.files("airtouch") / "vehicles" / "crazyflie-2.1-flow.toml").read_text()
+    (folder / "heavy.toml").write_text(re.sub(r"(?m)^mass_kg\s*=.*$", "mass_kg = 1.0", text))
+    return ["--vehicle", str(folder / "heavy.toml")]
+
+
+@pytest.mark.parametrize("refused", [heavy, lambda folder: ["--dask", "tcp://127.0.0.1:1"]])
+def test_a_refused_request_leaves_the_folder_as_it_is(tmp_path, refused, monkeypatch):
+    monkeypatch.setattr(cluster, "connect", dead_scheduler)
+    (tmp_path / "short.toml").write_text(SHORT)
+    request = [str(tmp_path / "short.toml"), "--out", str(tmp_path / "out")]
+    bad = CliRunner().invoke(command, [*request, *refused(tmp_path)])
+    assert isinstance(bad.exception, AirTouchError)
+    good = CliRunner().invoke(command, request)  # no run.json of the refused one is in its way
+    assert good.exit_code == 0, good.output + str(good.exception)
+    before = {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+    bad = CliRunner().invoke(command, [*request, "--seed", "1", "--force", *refused(tmp_path)])
+    assert isinstance(bad.exception, AirTouchError)
+    assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
+
+
+def dead_scheduler(address):
+    raise AirTouchError(f"no dask scheduler answers at {address}")
