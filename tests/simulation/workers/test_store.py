@@ -71,6 +71,18 @@ def test_fewer_flights_of_the_same_request_leave_all_of_them_listed(tmp_path):
     assert listed == [p.name for p in logs.files.in_folder(out)] and len(listed) == 2
 
 
+def test_rows_of_the_manifest_that_the_user_edited_stay(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    request = [str(tmp_path / "short.toml"), "--out", str(tmp_path / "out"), "-n"]
+    CliRunner().invoke(command, [*request, "2"])
+    manifest = tmp_path / "out" / "manifest.csv"
+    edited = manifest.read_text().replace("000000.csv.gz,clean,0", "000000.csv.gz,messy,4")
+    manifest.write_text(edited)
+    CliRunner().invoke(command, [*request, "3"])
+    after = manifest.read_text()
+    assert ",messy,4" in edited and after.startswith(edited) and len(after.splitlines()) == 4
+
+
 @pytest.mark.parametrize("force", [False, True])
 def test_a_damaged_request_is_no_request(tmp_path, force):
     store.open_folder(tmp_path, REQUEST)

@@ -127,15 +127,20 @@ def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | No
 def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
     """`manifest.csv` beside the flights of a scenario and seed, as `evaluate` and `crossval` read it.
 
-    speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle
-    and wind; folds go round by flight number. Raises AirTouchError for a manifest of something else.
+    Rows that it has stay as they are, edited or not, if their flight is there; those of new flights are appended.
+    speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle and wind; folds go round by
+    flight number. Raises AirTouchError for a manifest of something else.
     """
     check_manifest(folder)
-    lines = [HEAD]
-    for number, path in _flights(folder, scenario.name, seed).items():
+    path = folder / MANIFEST
+    listed = {row.split(",")[0]: row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
+    lines = [HEAD, *(row for name, row in listed.items() if (folder / name).exists())]
+    for number, flight in _flights(folder, scenario.name, seed).items():
+        if flight.name in listed:
+            continue
         values = draw_flight(scenario, seed, number).values
         height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
-        cells = [path.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
+        cells = [flight.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
         lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
     temporary = folder / f".{MANIFEST}.{os.getpid()}"
