@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
+from airtouch.simulation.flight import Diverged
 from airtouch.simulation.workers import cluster, store
 from short_scenario import SHORT
 
@@ -96,6 +97,13 @@ def test_a_damaged_list_of_diverged_flights_is_one_line(tmp_path):
     (tmp_path / store.FAILED).write_bytes(b"\xff\n")
     with pytest.raises(AirTouchError, match="diverged.jsonl: no text in UTF-8"):
         store.failures(tmp_path)
+
+
+@pytest.mark.parametrize("line", ["{}\n", "3\n", "null\n", '{"flight": 1}\n', '["a"]\n', '{"scenario": "sho', "{"])
+def test_a_line_that_is_no_record_hides_none(tmp_path, line):
+    (tmp_path / store.FAILED).write_text(line)
+    store.save(tmp_path, "short", Diverged("short", 3, 7, "it fell", 1.5))
+    assert [f["flight"] for f in store.failures(tmp_path)] == [7]
 
 
 def heavy(folder):

@@ -16,6 +16,7 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
+from airtouch.logs import json_lines
 from airtouch.logs.files import MANIFEST, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
@@ -97,7 +98,7 @@ def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
 
 
 def failures(folder: Path) -> list[dict[str, Any]]:
-    """Flights that diverged, by number; a line cut short by a kill is skipped.
+    """Flights that diverged, by number; a line that is no record, as one cut short by a kill, is skipped.
 
     Raises AirTouchError for a file that is no text.
     """
@@ -105,18 +106,18 @@ def failures(folder: Path) -> list[dict[str, Any]]:
     entries = {}
     for line in read_text(path).splitlines() if path.is_file() else []:
         try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
+            entry = vars(Diverged(**json.loads(line)))
+        except (ValueError, TypeError):
             continue
-        entries[entry["flight"]] = entry
+        if isinstance(entry["flight"], int) and is_number(entry["time_s"]):
+            entries[entry["flight"]] = entry
     return [entries[n] for n in sorted(entries)]
 
 
 def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | None:
     """Write a flight, or note one that diverged. An existing flight is kept."""
     if isinstance(result, Diverged):
-        with open(folder / FAILED, "a", encoding="utf-8") as file:
-            file.write(json.dumps(vars(result)) + "\n")
+        json_lines.append(folder / FAILED, [vars(result)])
         return None
     path = path_of(folder, scenario, result.meta["seed"], result.meta["flight"])
     if not path.exists():
