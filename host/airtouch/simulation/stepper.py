@@ -8,11 +8,13 @@ from airtouch.errors import AirTouchError
 from airtouch.simulation import effects as registry
 from airtouch.simulation import loop
 from airtouch.simulation import state as states
+from airtouch.simulation.body import motors
 from airtouch.simulation.effects import Active
 from airtouch.simulation.effects.slots import slots
 from airtouch.simulation.plant import from_vehicle, hover_pwm, hover_speed
 from airtouch.simulation.random_generator import generator
 from airtouch.simulation.scenario import FlightPlan
+from airtouch.simulation.sensors import imu, ranging
 from airtouch.vehicle import Vehicle
 
 MOST_HOVER_PWM = 62000  #: of 65535; the rest is what attitude control needs
@@ -42,12 +44,13 @@ class Stepper:
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
                  active: Sequence[Active]) -> None:
-        """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself."""
+        """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself, or a delay too long."""
         vehicle = plan.with_changes(vehicle)
         if hover_pwm(vehicle) > MOST_HOVER_PWM:
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
+        _check_delays(self.plant[0])
         self.state = states.empty()
         generators = np.zeros(1, loop.GENERATORS)
         for name in loop.GENERATORS.names or ():
@@ -63,6 +66,20 @@ class Stepper:
     def fly(self, setpoints: np.ndarray, table: np.ndarray) -> tuple[int, int]:
         """Fly len(table) rows of setpoints (rows, 8) into table (rows, 33). Returns OK or a reason, and rows filled."""
         return loop.fly(self.flight, setpoints, table)
+
+
+def _check_delays(row: np.void) -> None:
+    """Raise AirTouchError for a delay that is longer than its delay line, which would hold a later value."""
+    periods = row["firmware"]["periods"]
+    longest_s = {
+        "actuator_delay": (motors.DELAY_ROWS - 1) * row["step"],
+        "sensor_delay": 0.001 * (imu.DELAY_ROWS - 2),  # two samples are taken a step
+        "range_delay": 0.001 * (ranging.RANGES * periods["range_ms"] - 1),
+        "flow_delay": 0.001 * (ranging.FLOWS - 1) * periods["flow_ms"],
+    }
+    for name, most in longest_s.items():
+        if not 0.0 <= row[name] <= most:
+            raise AirTouchError(f"{name} = {row[name]:g} s is not what the simulator can fly; give 0 to {most:g} s")
 
 
 def _keys(acting: Sequence[Active]) -> list[str]:
