@@ -46,7 +46,7 @@ class Stepper:
                  active: Sequence[Active]) -> None:
         """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself, or a delay too long."""
         vehicle = plan.with_changes(vehicle)
-        if hover_pwm(vehicle) > MOST_HOVER_PWM:
+        if not hover_pwm(vehicle) <= MOST_HOVER_PWM:  # also where no PWM carries it, NaN
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
                                 f"{hover_pwm(vehicle):.0f}")
         self.plant, acting = prepare(vehicle, active)
