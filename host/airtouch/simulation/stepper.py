@@ -55,7 +55,7 @@ class Stepper:
         generators = np.zeros(1, loop.GENERATORS)
         for name in loop.GENERATORS.names or ():
             generators[0][name] = generator(seed, flight, name)
-        effects = slots(acting, [generator(seed, flight, key) for key in _keys(acting)])
+        effects = slots(acting, [generator(seed, flight, key) for key in keys(acting)])
         self.flight = loop.Flight(self.plant, plan.world, plan.room, effects, generators, self.state)
 
     def begin(self, setpoint: np.ndarray) -> None:
@@ -82,7 +82,11 @@ def _check_delays(row: np.void) -> None:
             raise AirTouchError(f"{name} = {row[name]:g} s is not what the simulator can fly; give 0 to {most:g} s")
 
 
-def _keys(acting: Sequence[Active]) -> list[str]:
-    """Names of the effects' random generators: an effect that comes twice draws other numbers the second time."""
+def keys(acting: Sequence[Active], first: str = "/1") -> list[str]:
+    """Names of the effects' random generators: an effect that comes twice draws other numbers the second time.
+
+    first: what follows the name of an effect that comes for the first time.
+    """
     names = [a.effect.name for a in acting]
-    return [f"{name}/{names[:i].count(name) + 1}" for i, name in enumerate(names)]
+    times = [names[:i].count(name) + 1 for i, name in enumerate(names)]
+    return [name + (first if time == 1 else f"/{time}") for name, time in zip(names, times, strict=True)]
