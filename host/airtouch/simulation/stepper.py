@@ -44,7 +44,7 @@ class Stepper:
 
     def __init__(self, plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int,
                  active: Sequence[Active]) -> None:
-        """As the flight of that number is drawn. AirTouchError for a vehicle that cannot lift itself, or a delay too long."""
+        """As the flight of that number is drawn. AirTouchError for a vehicle without lift and a delay too long."""
         vehicle = plan.with_changes(vehicle)
         if not hover_pwm(vehicle) <= MOST_HOVER_PWM:  # also where no PWM carries it, NaN
             raise AirTouchError(f"{vehicle.name} cannot lift itself: hover needs PWM "
