@@ -76,7 +76,10 @@ POSITIVE = {"mass_kg", "arm_m", "motor_time_constant_s", "rotor_radius_m", "grav
             "battery_cells", "battery_capacity_ah", "range_drift_time_s", "flow_noise_time_s"}
 #: fields that must be 0 or more
 NOT_NEGATIVE = {"acc_noise_rms_mps2", "gyro_noise_rms_radps", "range_noise_rms_m", "range_drift_rms", "acc_lowpass_hz",
-                "gyro_bandwidth_hz", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps"}
+                "gyro_bandwidth_hz", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps", "rotor_drag_kg_per_rad",
+                "voltage_exponent", "thrust_per_speed2", "rotor_inertia_kg_m2", "motor_fall_time_constant_s",
+                "battery_resistance_ohm", "power_per_thrust15", "thrust_base_pwm", "arm_pwm"}
+FULL_PWM = 65535.0
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 
@@ -159,6 +162,10 @@ def numbers(table: Mapping[str, Any], source: str) -> dict[str, Any]:
                                          above=0.0 if name in POSITIVE else -np.inf)
     if min(values.get("inertia_kg_m2", (1.0,))) <= 0:
         raise AirTouchError(f"{source}: inertia must be positive")
+    c0, c1, c2 = values.get("thrust_of_pwm_n", (0.0, 1.0, 0.0))
+    if c0 + (c1 + c2 * FULL_PWM) * FULL_PWM <= 0.0 or c1 + 2.0 * c2 * FULL_PWM <= 0.0:
+        raise AirTouchError(f"{source}: thrust_of_pwm_n must give a thrust at PWM {FULL_PWM:.0f} that is positive and "
+                            "grows with PWM")
     return values
 
 

@@ -1,5 +1,6 @@
 """`airtouch logs`, as a user calls it."""
 
+import gzip
 import json
 
 import numpy as np
@@ -111,9 +112,20 @@ def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):
 
 def test_convert_never_replaces_its_input_or_another_result(folder):
     result = call("convert", folder / "good.csv", "--out", folder, "--format", "csv", "--force")
-    assert result.exit_code == 2 and "its own conversion" in result.stderr
+    assert result.exit_code == 2 and "a file to convert" in result.stderr
     result = call("convert", folder / "good.csv", folder / "good.csv", "--out", folder / "o", "--force")
     assert result.exit_code == 2 and "1 flight written" in result.stderr
     with pytest.raises(AirTouchError, match="cannot be made"):
         CliRunner().invoke(command, ["convert", str(folder / "good.csv"), "--out", str(folder / "good.csv")],
                            catch_exceptions=False)
+
+
+def test_convert_replaces_no_later_input(folder):
+    data = (folder / "good.csv").read_bytes()
+    both = [folder / "x.csv", folder / "x.csv.gz"]
+    both[0].write_bytes(data)
+    both[1].write_bytes(other := gzip.compress(data[:len(data) // 2]))
+    for names in (both, [folder]):
+        result = call("convert", *names, "--out", folder, "--format", "csv.gz", "--force")
+        assert result.exit_code == 2 and "a file to convert" in result.stderr
+        assert both[1].read_bytes() == other

@@ -1,13 +1,16 @@
 """What the simulator makes of a vehicle: built-in ones and other people's hover; the larger one senses further."""
 
 import math
+import re
 from dataclasses import replace
+from importlib import resources
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
 from airtouch.simulation import flight
 from airtouch.simulation.effects.air.ground_effect import thrust_ratio
 from airtouch.simulation.plant import from_vehicle, hover_pwm
@@ -66,3 +69,16 @@ acc_noise_ratio = [1.0, 2.0, 3.0]
     np.testing.assert_allclose(from_vehicle(v)[0]["acc_noise"], 0.06 * np.array([1, 2, 3]))
     assert hover_pwm(v) == pytest.approx(math.sqrt(0.03 * 9.81 / 4 / 4e-11))
     assert hover_pwm(replace(v, thrust_of_pwm_n=(0.0, 1e-6, 0.0))) == pytest.approx(0.03 * 9.81 / 4 / 1e-6)
+
+
+@pytest.mark.parametrize("line", [
+    "thrust_of_pwm_n = [0, 0, 0]", "thrust_of_pwm_n = [0.1, 0, 0]", "thrust_of_pwm_n = [0, -1e-6, 0]",
+    "thrust_of_pwm_n = [0, 1e-6, -1e-11]", "battery_resistance_ohm = -0.1", "power_per_thrust15 = -1",
+    "rotor_drag_kg_per_rad = -1e-6", "voltage_exponent = -1", "motor_time_constant_s = 0",
+    "motor_fall_time_constant_s = -0.1", "rotor_inertia_kg_m2 = -1e-8", "thrust_per_speed2 = -1e-8"])
+def test_an_impossible_vehicle_is_refused_with_the_name_of_its_field(line):
+    text = (resources.files("airtouch") / "vehicles" / "crazyflie-2.1-flow.toml").read_text()
+    name = line.split(" = ")[0]
+    text = re.sub(rf"(?m)^{name}\s*=.*\n", "", text) + line + "\n"
+    with pytest.raises(AirTouchError, match=f"mine.toml: {name}"):
+        vehicles.parse(text, "mine.toml")

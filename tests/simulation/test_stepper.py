@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
+from airtouch.errors import AirTouchError
 from airtouch.simulation import loop, scenario
+from airtouch.simulation.effects import Active, Effect
 from airtouch.simulation.flight import choose
 from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
@@ -45,3 +47,39 @@ def test_a_second_flight_begins_with_the_rotors_of_the_first():
         stepper.fly(plan.setpoints[:300], np.empty((300, log_row.COLUMNS)))
         assert np.ptp(gain / nominal) > 0.001  # noise of the last step
         np.testing.assert_array_equal(stepper.plant[0]["gain"], nominal)  # which leaves the plant as it is
+
+
+def with_delay(field, delay_s):
+    """An effect that sets a delay of the plant."""
+    def set_delay(plant, values):
+        plant[field] = delay_s
+
+    return [Active(Effect("late", "late", (), settings=set_delay), {})]
+
+
+@pytest.mark.parametrize("delay_s", [0.1, 0.125, 0.126])
+def test_a_delayed_command_arrives_after_the_delay(delay_s):
+    """Rotors without a command slow down; they start `delay_s` after the first one. Physics steps are 2 ms."""
+    plan = scenario.draw_flight(scenario.load("hover"), 1, 0)
+    started = []
+    for late in (0.0, delay_s):
+        stepper = Stepper(plan, vehicle.load(), 1, 0, with_delay("actuator_delay", late))
+        stepper.begin(plan.setpoints[0])
+        table = np.empty((300, log_row.COLUMNS))
+        moving = []
+        for row in range(300):
+            stepper.fly(plan.setpoints[row:row + 1], table[row:row + 1])
+            moving.append(stepper.state[0]["body"]["rotor_speed"].max() > 1.0)
+        started.append(moving.index(True))
+    assert started[1] - started[0] in (int(100 * delay_s), int(100 * delay_s) + 1)
+
+
+@pytest.mark.parametrize(("field", "fits", "wraps"), [
+    ("actuator_delay", 0.126, 0.2), ("sensor_delay", 0.126, 0.13), ("range_delay", 0.399, 0.5),
+    ("flow_delay", 0.63, 0.7)])
+def test_a_delay_beyond_its_line_is_refused(field, fits, wraps):
+    plan = scenario.draw_flight(scenario.load("hover"), 1, 0)
+    Stepper(plan, vehicle.load(), 1, 0, with_delay(field, fits))
+    for bad in (wraps, np.nan, -0.01):
+        with pytest.raises(AirTouchError, match=field):
+            Stepper(plan, vehicle.load(), 1, 0, with_delay(field, bad))

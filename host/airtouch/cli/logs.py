@@ -46,7 +46,7 @@ def info(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs info flights/*.csv.gz
     """
-    summaries, left_out = _each(files, lambda path: logs.summary(logs.read(path)))
+    summaries, left_out = _each(_inputs(files), lambda path: logs.summary(logs.read(path)))
     if as_json:
         _print_json(summaries, left_out)
     else:
@@ -66,7 +66,7 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs check flights/ --json > quality.json
     """
-    reports, left_out = _each(files, lambda path: logs.check(logs.read(path)).as_dict())
+    reports, left_out = _each(_inputs(files), lambda path: logs.check(logs.read(path)).as_dict())
     if as_json:
         _print_json(reports, left_out)
     else:
@@ -111,13 +111,16 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     folder = Path(out)
     make_folder(folder)
     written: set[Path] = set()
+    inputs = _inputs(files)
+    kept = {os.path.realpath(path) for path in inputs[0]}
 
     def one(path: Path) -> Path:
         target = folder / f"{_stem(path)}.{ending}"
         if target in written:
             raise AirTouchError(f"{path}: another file of this call is {target} already; rename one of them")
-        if os.path.exists(target) and os.path.exists(path) and target.samefile(path):
-            raise AirTouchError(f"{path}: would be replaced by its own conversion; choose another --out")
+        if os.path.realpath(target) in kept:
+            raise AirTouchError(f"{path}: its conversion would replace {target}, a file to convert; choose another "
+                                "--out")
         log = mapped.read(path, mapping) if mapping else logs.read(path)
         log = log if rate is None else logs.resample(log, rate)
         if plain:
@@ -129,19 +132,27 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         written.add(target)
         return target
 
-    written_files, left_out = _each(files, one)
+    written_files, left_out = _each(inputs, one)
     _finish(len(written_files), left_out, f"written to {folder}")
 
 
-def _each(files: Iterable[str], act: Callable[[Path], Any]) -> tuple[list[Any], list[dict[str, str]]]:
-    """Call `act` on every file. Returns the results, and the failed files with their reasons."""
+def _inputs(files: Iterable[str]) -> tuple[list[Path], list[dict[str, str]]]:
+    """The flight logs that the names stand for, and the names that stand for none with their reasons."""
     paths: list[Path] = []
-    results, left_out = [], []
+    left_out = []
     for name in files:
         try:
             paths += _expand(Path(name))
         except AirTouchError as error:
             left_out.append({"file": name, "reason": str(error)})
+    return paths, left_out
+
+
+def _each(inputs: tuple[list[Path], list[dict[str, str]]], act: Callable[[Path], Any],
+          ) -> tuple[list[Any], list[dict[str, str]]]:
+    """Call `act` on every file of `_inputs`. Returns the results, and the failed files with their reasons."""
+    paths, left_out = inputs
+    results = []
     for path in _progress(paths):
         try:
             results.append(act(path))

@@ -83,6 +83,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
     from airtouch.simulation.flight import choose, refuse_off
+    from airtouch.simulation.stepper import Stepper
     from airtouch.simulation.workers import cluster, local, store
 
     if flights < 1 or seed < 0 or (workers is not None and workers < 1):
@@ -96,7 +97,8 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     pairs = [effects.parse(text) for text in chosen]
     plan = scenarios.draw_flight(scene, seed, 0)
     refuse_off(plan, without)
-    choose(plan, pairs, without)
+    Stepper(plan, craft, seed, 0, choose(plan, pairs, without))  # a vehicle that cannot fly is refused here
+    client = cluster.connect(dask) if dask else None
     request = {"scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)),
                "vehicle": vars(craft), "effects": pairs, "without": list(without), "seed": seed,
                "effect_files": [store.digest(text) for text in plugins]}
@@ -105,8 +107,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     if len(todo) < flights:
         click.echo(f"{flights - len(todo)} of {flights} flights are there already")
     results: Iterator[FlightLog | Diverged] | Iterator[Diverged | None]
-    if dask:
-        client = cluster.connect(dask)
+    if client is not None:
         results = cluster.flights(client, scene, todo, vehicle=craft, effects=pairs, without=without, seed=seed,
                                   plugins=plugins)
     else:

@@ -26,7 +26,12 @@ def read(path: Path | None) -> list[dict[str, Any]]:
 
 
 def append(path: Path | None, objects: Iterable[dict[str, Any]]) -> None:
-    """Append objects to a file, which is made if it is not there; nothing without a path."""
+    """Append objects to a file, which is made if it is not there; nothing without a path.
+
+    A last line that a kill cut short stays a line of its own.
+    """
     if path is not None:
+        cut = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
         with path.open("a", encoding="utf-8") as out:
+            out.write("\n" * cut)
             out.writelines(json.dumps(one) + "\n" for one in objects)

@@ -1,5 +1,7 @@
 """Recorded motor commands through the same motors, rigid body and effects as in flight.
 
+Left out are the plant's motor_slowness and motor_dead_zone, which only effects of a user's own set, and motor noise.
+
 Nothing is integrated but what the motors and the effects remember: attitude, velocity
 and height come from the log where it has them. The diagnosis compares the result with
 what the IMU measured.
@@ -23,6 +25,7 @@ from airtouch.simulation.flight import prepare
 from airtouch.simulation.plant import PLANT, hover_speed
 from airtouch.simulation.random_generator import generator
 from airtouch.simulation.sensors import filters
+from airtouch.simulation.stepper import keys
 from airtouch.vehicle import Vehicle
 
 FAR_M = 10.0  #: height where none is known: out of ground effect
@@ -177,7 +180,7 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = log["vbat_V"].copy()
-    effects = slots.slots(acting, [generator(seed, 0, a.effect.name) for a in acting])
+    effects = slots.slots(acting, [generator(seed, 0, key) for key in keys(acting, first="")])
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
     commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
     if not np.isfinite(commands).all():

@@ -7,7 +7,8 @@ from pathlib import Path
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation.score import FlightScore
-from airtouch.logs.files import write_bytes
+from airtouch.errors import AirTouchError
+from airtouch.logs.files import read_text, write_bytes
 
 
 def model(path: Path, make: Callable[[], BestModel]) -> BestModel:
@@ -23,9 +24,15 @@ def model(path: Path, make: Callable[[], BestModel]) -> BestModel:
 
 
 def scores(path: Path, make: Callable[[], list[FlightScore]]) -> list[FlightScore]:
-    """The scores in a file (JSON); without the file they are made and saved there."""
+    """The scores in a file (JSON); without the file they are made and saved there.
+
+    Raises AirTouchError for a file that holds none.
+    """
     if path.is_file():
-        return [FlightScore.from_dict(s) for s in json.loads(path.read_text())]
+        try:
+            return [FlightScore.from_dict(s) for s in json.loads(read_text(path))]
+        except (ValueError, TypeError, KeyError, AttributeError):
+            raise AirTouchError(f"{path}: no scores of flights; remove the file, and they are made anew") from None
     new = make()
     write_bytes(json.dumps([s.as_dict() for s in new], allow_nan=False).encode(), path, force=True)
     return new

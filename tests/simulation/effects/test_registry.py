@@ -152,3 +152,20 @@ def test_the_docs_table_is_not_stale():
     from airtouch.simulation.effects.table import updated
     page = (Path(__file__).parents[3] / "host" / "docs" / "effects.md").read_text(encoding="utf-8")
     assert page == updated(page), "run: python -m airtouch.simulation.effects.table host/docs/effects.md"
+
+
+def test_too_many_parameters_are_told_with_the_limit():
+    p = effects.Parameter("size", "1", 0.0, 0.0, 1.0, 0.0, "")
+    effects.Effect("many", "", (p,) * 12)
+    with pytest.raises(AirTouchError, match="many: 13 parameters; 12 at most"):
+        effects.Effect("many", "", (p,) * 13)
+
+
+@pytest.mark.parametrize("second", ["wind", "first_of_two"])
+def test_a_taken_name_leaves_no_effect_of_the_file_registered(tmp_path, second):
+    file = tmp_path / "magnet.py"
+    file.write_text("from airtouch.simulation.effects import Effect\n"
+                    f'a = Effect("first_of_two", "", ())\nb = Effect("{second}", "", ())\n')
+    with pytest.raises(AirTouchError, match=f"magnet.py: .*{second}.*another name"):
+        effects.load_file(file)
+    assert "first_of_two" not in effects.EFFECTS

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects, replay
 from airtouch.simulation.effects import slots
 from airtouch.simulation.effects.effect import MEMORY
@@ -36,3 +37,11 @@ def test_more_effects_than_slots_are_refused():
     active = effects.activate({"wind": {}}) * (slots.SLOTS + 1)
     with pytest.raises(AirTouchError, match="17 effects with a force at once; at most 16"):
         slots.slots(active, [generator(0, 0, "wind")] * len(active))
+
+
+def test_a_replayed_effect_that_comes_twice_draws_other_numbers(vehicle):
+    """Two equal, independent gusts have sqrt(2) times the rms of one, not twice; 200 s are some hundred draws."""
+    log = FlightLog({name: np.full(20000, 36000.0) for name in PWM})
+    gust = effects.activate({"gust": {"rms": 0.3}})
+    one, two = (replay.run(log, vehicle, active).specific_force[:, 0] for active in (gust, gust * 2))
+    assert 1.2 < two.std() / one.std() < 1.7

@@ -22,3 +22,8 @@ def test_a_beam_ends_at_the_wall(seed):
 def test_beams_look_to_the_front_the_back_the_left_and_the_right():
     """From (0.5, 0) with the nose along x; left is +y."""
     assert [wall_distance(0.5, 0.0, d, ROOM) for d in DIRECTIONS_RAD] == pytest.approx([2.0, 2.0, 1.0, 3.0])
+
+
+@pytest.mark.parametrize("place", [(-2.0, 0.0), (3.0, 0.0), (0.0, -4.0), (0.0, 2.0)])
+def test_outside_the_room_there_is_no_wall_to_see(place):
+    assert all(np.isnan(wall_distance(*place, d, ROOM)) for d in DIRECTIONS_RAD)

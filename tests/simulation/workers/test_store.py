@@ -1,6 +1,8 @@
 """A folder of simulated flights keeps what the simulator did not write, and may hold damaged files of its own."""
 
 import csv
+import re
+from importlib import resources
 
 import pytest
 from click.testing import CliRunner
@@ -8,7 +10,8 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
-from airtouch.simulation.workers import store
+from airtouch.simulation.flight import Diverged
+from airtouch.simulation.workers import cluster, store
 from short_scenario import SHORT
 
 REQUEST = {"scenario": "short", "seed": 3}
@@ -69,6 +72,18 @@ def test_fewer_flights_of_the_same_request_leave_all_of_them_listed(tmp_path):
     assert listed == [p.name for p in logs.files.in_folder(out)] and len(listed) == 2
 
 
+def test_rows_of_the_manifest_that_the_user_edited_stay(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    request = [str(tmp_path / "short.toml"), "--out", str(tmp_path / "out"), "-n"]
+    CliRunner().invoke(command, [*request, "2"])
+    manifest = tmp_path / "out" / "manifest.csv"
+    edited = manifest.read_text().replace("000000.csv.gz,clean,0", "000000.csv.gz,messy,4")
+    manifest.write_text(edited)
+    CliRunner().invoke(command, [*request, "3"])
+    after = manifest.read_text()
+    assert ",messy,4" in edited and after.startswith(edited) and len(after.splitlines()) == 4
+
+
 @pytest.mark.parametrize("force", [False, True])
 def test_a_damaged_request_is_no_request(tmp_path, force):
     store.open_folder(tmp_path, REQUEST)
@@ -82,3 +97,36 @@ def test_a_damaged_list_of_diverged_flights_is_one_line(tmp_path):
     (tmp_path / store.FAILED).write_bytes(b"\xff\n")
     with pytest.raises(AirTouchError, match="diverged.jsonl: no text in UTF-8"):
         store.failures(tmp_path)
+
+
+@pytest.mark.parametrize("line", ["{}\n", "3\n", "null\n", '{"flight": 1}\n', '["a"]\n', '{"scenario": "sho', "{"])
+def test_a_line_that_is_no_record_hides_none(tmp_path, line):
+    (tmp_path / store.FAILED).write_text(line)
+    store.save(tmp_path, "short", Diverged("short", 3, 7, "it fell", 1.5))
+    assert [f["flight"] for f in store.failures(tmp_path)] == [7]
+
+
+def heavy(folder):
+    """A vehicle file of 1 kg, which a Crazyflie's motors do not lift."""
+    text = (resources.files("airtouch") / "vehicles" / "crazyflie-2.1-flow.toml").read_text()
+    (folder / "heavy.toml").write_text(re.sub(r"(?m)^mass_kg\s*=.*$", "mass_kg = 1.0", text))
+    return ["--vehicle", str(folder / "heavy.toml")]
+
+
+@pytest.mark.parametrize("refused", [heavy, lambda folder: ["--dask", "tcp://127.0.0.1:1"]])
+def test_a_refused_request_leaves_the_folder_as_it_is(tmp_path, refused, monkeypatch):
+    monkeypatch.setattr(cluster, "connect", dead_scheduler)
+    (tmp_path / "short.toml").write_text(SHORT)
+    request = [str(tmp_path / "short.toml"), "--out", str(tmp_path / "out")]
+    bad = CliRunner().invoke(command, [*request, *refused(tmp_path)])
+    assert isinstance(bad.exception, AirTouchError)
+    good = CliRunner().invoke(command, request)  # no run.json of the refused one is in its way
+    assert good.exit_code == 0, good.output + str(good.exception)
+    before = {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+    bad = CliRunner().invoke(command, [*request, "--seed", "1", "--force", *refused(tmp_path)])
+    assert isinstance(bad.exception, AirTouchError)
+    assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == before
+
+
+def dead_scheduler(address):
+    raise AirTouchError(f"no dask scheduler answers at {address}")

@@ -15,6 +15,9 @@ FRICTION_S = 0.02  #: sliding dies out with this time constant, under full weigh
 def legs(plant, pose, s, force):
     """Add force and torque of the legs to force (6,), N and N m; returns the depth of the deepest leg in a surface, m.
 
+    Friction turns the vehicle about its z axis alone. Left out is its torque about x and y, (leg fy, -leg fx) of a
+    foot `leg` below the centre of mass: what was learned from simulated landings was learned without it.
+
     pose (13,): state of the body; s (COUNT,): its signals.
     """
     leg = plant.range_below_rotors + plant.leg_below_range

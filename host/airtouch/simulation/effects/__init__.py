@@ -144,6 +144,10 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     defined = [v for v in scope.values() if isinstance(v, Effect)]
     if not defined:
         raise AirTouchError(f"{source}: defines no Effect")
+    names_of_file = [e.name for e in defined]
+    for name in names_of_file:
+        if name in EFFECTS or names_of_file.count(name) > 1:
+            raise AirTouchError(f"{source}: an effect named {name!r} is already there; give yours another name")
     _LOADED[key] = [register(e) for e in defined]
     return _LOADED[key]
 

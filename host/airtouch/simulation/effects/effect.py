@@ -24,7 +24,7 @@ WrenchFunction = types.FunctionType(SIGNATURE)
 def wrench(function: Callable) -> Any:
     """Compile `function(p, s, memory, generator, out)` so that simulator and diagnosis can call it.
 
-    p: the effect's parameters in their declared order (10 at most). s: signals, by the places in
+    p: the effect's parameters in their declared order (PARAMETERS at most). s: signals, by the places in
     `simulation.signals`. memory (12,): zero at the start of a flight, its own from then
     on. generator: its random numbers, for `random_generator.normal`. out (6,): add force
     (N) and torque (N m) about the centre of mass, body axes. Called once a step.
@@ -69,7 +69,9 @@ class Effect:
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
 
     def __post_init__(self) -> None:
-        """Raise AirTouchError for a wrench that nobody compiled."""
+        """Raise AirTouchError for a wrench that nobody compiled and for too many parameters."""
+        if len(self.parameters) > PARAMETERS:
+            raise AirTouchError(f"effect {self.name}: {len(self.parameters)} parameters; {PARAMETERS} at most")
         if inspect.isfunction(self.wrench):
             raise AirTouchError(f"effect {self.name}: put @wrench above the function {self.wrench.__name__}, "
                                 "so that it is compiled")

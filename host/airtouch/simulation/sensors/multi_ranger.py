@@ -26,7 +26,12 @@ def read(state, room):
 
 @jit
 def wall_distance(x, y, direction, room):
-    """Distance in m from (x, y) along `direction` (rad) to the wall of room (x0, x1, y0, y1)."""
+    """Distance in m from (x, y) along `direction` (rad) to the wall of room (x0, x1, y0, y1).
+
+    NaN outside the room.
+    """
+    if not (room[0] <= x <= room[1] and room[2] <= y <= room[3]):
+        return math.nan
     c, s = math.cos(direction), math.sin(direction)
     far = 1e9
     if c > 1e-9:

@@ -16,6 +16,7 @@ from typing import Any
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
+from airtouch.logs import json_lines
 from airtouch.logs.files import MANIFEST, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
@@ -97,7 +98,7 @@ def missing(folder: Path, scenario: str, seed: int, count: int) -> list[int]:
 
 
 def failures(folder: Path) -> list[dict[str, Any]]:
-    """Flights that diverged, by number; a line cut short by a kill is skipped.
+    """Flights that diverged, by number; a line that is no record, as one cut short by a kill, is skipped.
 
     Raises AirTouchError for a file that is no text.
     """
@@ -105,18 +106,18 @@ def failures(folder: Path) -> list[dict[str, Any]]:
     entries = {}
     for line in read_text(path).splitlines() if path.is_file() else []:
         try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
+            entry = vars(Diverged(**json.loads(line)))
+        except (ValueError, TypeError):
             continue
-        entries[entry["flight"]] = entry
+        if isinstance(entry["flight"], int) and is_number(entry["time_s"]):
+            entries[entry["flight"]] = entry
     return [entries[n] for n in sorted(entries)]
 
 
 def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | None:
     """Write a flight, or note one that diverged. An existing flight is kept."""
     if isinstance(result, Diverged):
-        with open(folder / FAILED, "a", encoding="utf-8") as file:
-            file.write(json.dumps(vars(result)) + "\n")
+        json_lines.append(folder / FAILED, [vars(result)])
         return None
     path = path_of(folder, scenario, result.meta["seed"], result.meta["flight"])
     if not path.exists():
@@ -127,15 +128,20 @@ def save(folder: Path, scenario: str, result: FlightLog | Diverged) -> Path | No
 def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
     """`manifest.csv` beside the flights of a scenario and seed, as `evaluate` and `crossval` read it.
 
-    speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle
-    and wind; folds go round by flight number. Raises AirTouchError for a manifest of something else.
+    Rows that it has stay as they are, edited or not, if their flight is there; those of new flights are appended.
+    speed_mps, height, angle_deg and wind are the scenario's values speed, clearance, angle and wind; folds go round by
+    flight number. Raises AirTouchError for a manifest of something else.
     """
     check_manifest(folder)
-    lines = [HEAD]
-    for number, path in _flights(folder, scenario.name, seed).items():
+    path = folder / MANIFEST
+    listed = {row.split(",")[0]: row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
+    lines = [HEAD, *(row for name, row in listed.items() if (folder / name).exists())]
+    for number, flight in _flights(folder, scenario.name, seed).items():
+        if flight.name in listed:
+            continue
         values = draw_flight(scenario, seed, number).values
         height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
-        cells = [path.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
+        cells = [flight.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
         lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
     temporary = folder / f".{MANIFEST}.{os.getpid()}"

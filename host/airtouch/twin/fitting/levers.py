@@ -202,8 +202,8 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
           spread: bool = True) -> dict[str, Any]:
     """The table of a scenario's effects with the levers set. fixed: effects without levers.
 
-    spread: write levers with a spread as ranges. The levers of "trim" become the effect `weak_motor`. Raises
-    AirTouchError for a lever of an unknown effect or parameter.
+    spread: write levers with a spread as ranges. The levers of "trim" become the effect `weak_motor`, their sum within
+    what it takes. Raises AirTouchError for a lever of an unknown effect or parameter.
     """
     out: dict[str, Any] = {name: dict(settings) if isinstance(settings, Mapping) else list(settings)
                            for name, settings in (fixed or {}).items()}
@@ -221,8 +221,10 @@ def table(levers: Sequence[Lever], values: Sequence[float] | np.ndarray, fixed: 
             if set(setting) - valid:
                 raise AirTouchError(f"levers: {name} has no parameter {', '.join(sorted(set(setting) - valid))}")
     if any(lever.of == "trim" for lever in levers):
-        out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(-trims[i], trim_spread if spread else 0.0)}
-                             for i in range(4)]
+        loss = next(p for p in registry.get("weak_motor").parameters if p.name == "thrust_loss")
+        out["weak_motor"] = [{"rotor": i + 1, "thrust_loss": _range(min(max(-trims[i], loss.low), loss.high),
+                                                                    trim_spread if spread else 0.0,
+                                                                    loss.low, loss.high)} for i in range(4)]
     return out
 
 
@@ -231,7 +233,7 @@ def _node(lever: Lever, value: float, spread: bool) -> Any:
     return _range(value, lever.spread if spread and lever.spread else 0.0, lever.low, lever.high)
 
 
-def _range(centre: float, half_width: float, low: float = -1.0, high: float = 1.0) -> Any:
+def _range(centre: float, half_width: float, low: float, high: float) -> Any:
     """A range within bounds, or the centre alone where it has no width."""
     centre = round(float(centre), 6)
     if half_width <= 0.0:
