@@ -33,8 +33,9 @@ def misses(row: Mapping[str, Any]) -> str:
 
 
 def score(row: Mapping[str, Any]) -> str:
-    """Error, misses and false edges side by side."""
-    return f"{metres(row)}, {misses(row)}, {row['false_per_minute'] or 0:.1f} false a minute"
+    """Error, misses and false edges side by side; "-" where the number of false edges is unknown."""
+    false = row["false_per_minute"]
+    return f"{metres(row)}, {misses(row)}, {'-' if false is None else f'{false:.1f}'} false a minute"
 
 
 def reaches(row: Mapping[str, Any], error_m: float) -> bool:
