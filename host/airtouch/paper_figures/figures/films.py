@@ -42,7 +42,7 @@ def crossings(job: Job) -> Crossings:
     job.tell(f"{training_count + scored_count} simulated flights, {SCENE}")
     films = [film(log, SEED) for log in simulated.flights(SCENE, training_count + scored_count)]
     training, scored = films[:training_count], films[training_count:]
-    airtouch = {name: compare.airtouch_crossings(films, name) for name in AIRTOUCH}
+    airtouch = {name: compare.airtouch_crossings(films, name, training_count) for name in AIRTOUCH}
     camera: dict[tuple[str, float], list] = {}
     for lux in lux_of(job):
         by_method = _camera(job, films, training_count, lux, f"{training_count}_{scored_count}_{lux:g}_{settings}")

@@ -22,7 +22,8 @@ Summaries = dict[str, dict[str, Any]]  #: detector -> summary of its scores
 ByLight = dict[tuple[str, float], dict[str, Any]]  #: (method, lux) -> summary of its scores
 LIMITS = ("A rendered scene can say how exposure, blur, noise and frame rate move the error of a line's place. It "
           "cannot say how a real platform looks: no gloss, no shadow of the drone (which at 4 cm hides most of the "
-          "light), no lens errors, no rim of its own colour, and the network was trained on the same renderer.")
+          "light), no lens errors, no rim of its own colour, and the network was trained on the same renderer. The "
+          "constant lag of each sense is fitted on other flights of the same simulator.")
 
 
 def light(job: Job) -> Figure:
