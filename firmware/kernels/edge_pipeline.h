@@ -57,7 +57,7 @@ typedef struct {
   float voltageFactor;      ///< of the last known voltage
   float bandPower[EDGE_PIPELINE_CHANNELS];
   float features[EDGE_PIPELINE_SENSORS];
-  uint32_t nonFinite;
+  uint32_t nonFinite;   ///< values replaced so far
   uint32_t sinceAlert;  ///< samples, EDGE_NEVER before any
   uint32_t sinceEdge;
   uint32_t airborneSteps;  ///< samples in the air without a break

@@ -72,7 +72,7 @@ typedef struct {
   float forceNorm;      ///< ||f_w||, N
   float cfarPower;      ///< the cell under test
   float threshold;      ///< its threshold, NaN until known
-  uint32_t nonFinite;   ///< acc, gyro and PWM samples replaced so far
+  uint32_t nonFinite;   ///< values of acc, gyro and PWM replaced so far, up to 10 a sample
   uint8_t ready;        ///< band power and features are new
   uint8_t alert;        ///< the cell exceeds its threshold
   uint8_t alertRecent;  ///< there was an alert within the last alertHold samples

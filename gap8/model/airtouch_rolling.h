@@ -3,7 +3,7 @@
 // The `paper-stream` detector: 2956 bytes of constants.
 // Input: 3 fused features a sample, on airtouchRollingScale (fixedScaleApply), then quantised:
 // networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: 2 logits
-// on every 4th sample, 2 samples before the window is full. The same network runs over whole windows.
+// on one sample in 4, 2 samples before the window is full. The same network runs over whole windows.
 #pragma once
 
 #include "fixed_scale.h"

@@ -2,7 +2,7 @@
 // Model SHA-256: f7657a4eb8eb06959b699c5d7935de820b003181cb6aa2317534997f19199421
 // The `best` detector: 9891 bytes of constants.
 // Input: 12 motion channels a sample (motion_channels.h), quantised by airtouchStreamQuantisation.
-// Output: logits on every 2nd sample: over, entry, exit (edge_decoder.h).
+// Output: logits on one sample in 2: over, entry, exit (edge_decoder.h).
 #pragma once
 
 #include "kernel_types.h"

@@ -6,14 +6,15 @@ import pytest
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.paper_figures import simulated
+from airtouch.simulation.flight_plan import world
 
 
 def test_a_crossing_by_place_is_where_the_drone_passes_the_outline():
     corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
     x = np.linspace(0.0, 3.0, 301)
-    inside = simulated.inside(corners, x, np.zeros(301))
+    inside = world.inside(corners, x, np.zeros(301))
     assert x[inside].min() == pytest.approx(1.0) and x[inside].max() == pytest.approx(2.0)
-    assert not simulated.inside(corners, x, np.full(301, 1.5)).any()
+    assert not world.inside(corners, x, np.full(301, 1.5)).any()
 
 
 def test_labels_by_place_are_a_step_of_the_down_range_and_nothing_else():

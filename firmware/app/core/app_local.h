@@ -1,8 +1,8 @@
 /**
  * @file app_local.h
  * `best` on the STM32 while the GAP8 is silent. The samples that were meant for the GAP8 are
- * still there, so the same network runs over them here: first over a whole window of the past,
- * a few samples a step, then over each new one. Its answers are those that the GAP8 would give.
+ * still there, so the same network runs over them here: first over the window before the first
+ * unanswered one, a few samples a step, then over each new one. Its answers are those that the GAP8 would give.
  */
 #pragma once
 

@@ -16,7 +16,12 @@ typedef struct {
   uint8_t accInBody;  ///< 0: acc is in world axes; 1: in body axes, and is turned by the attitude
 } appSample_t;
 
-/** Settings that may change in flight; the PARAM group `airtouch`. */
+/**
+ * Settings that may change in flight; the PARAM group `airtouch`.
+ * The defaults of probabilityIn, probabilityOut, probabilityDwell and alertHold are `paper`'s own values.
+ * `paper-stream` takes each of them for "tuned" and uses its own value in its place (app_paper.h): it cannot be given
+ * `paper`'s exact value.
+ */
 typedef struct {
   uint8_t enable;             ///< 0: nothing is computed, nothing is sent
   uint8_t detector;           ///< appDetector_t
@@ -24,12 +29,12 @@ typedef struct {
   float bandMid;              ///< Hz, FC-FE: middle of the band
   float bandWidth;            ///< Hz, both edges included
   float pFa;                  ///< FR-CFAR: probability of false alarm
-  float probabilityIn;        ///< `paper`: over a platform from here up
-  float probabilityOut;       ///< `paper`: off it from here down
+  float probabilityIn;        ///< `paper`: over a platform from here up; its default means tuned
+  float probabilityOut;       ///< `paper`: off it from here down; its default means tuned
   float scoreIn;              ///< `best`: an entry fires above this logit
   float scoreOut;             ///< `best`: an exit fires above this logit
-  uint16_t probabilityDwell;  ///< `paper`: at least so many steps between two edges
-  uint16_t alertHold;         ///< filter: an FR-CFAR alert vouches for the edges of so many steps
+  uint16_t probabilityDwell;  ///< `paper`: at least so many steps between two edges; its default means tuned
+  uint16_t alertHold;  ///< filter: an FR-CFAR alert vouches for the edges of so many steps; its default means tuned
 } appParams_t;
 
 /** What the app says; the LOG group `airtouch`. */

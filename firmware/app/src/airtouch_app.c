@@ -182,16 +182,16 @@ PARAM_ADD(PARAM_FLOAT, bandMid, &wantedParams.bandMid)
 PARAM_ADD(PARAM_FLOAT, bandWidth, &wantedParams.bandWidth)
 /** @brief FR-CFAR: probability of false alarm, 1e-12 to 0.5 */
 PARAM_ADD(PARAM_FLOAT, pFa, &wantedParams.pFa)
-/** @brief paper: over a platform from this probability up */
+/** @brief paper: over a platform from this probability up; 0.9 in paper-stream means its own */
 PARAM_ADD(PARAM_FLOAT, probIn, &wantedParams.probabilityIn)
-/** @brief paper: off it from this probability down */
+/** @brief paper: off it from this probability down; 0.2 in paper-stream means its own */
 PARAM_ADD(PARAM_FLOAT, probOut, &wantedParams.probabilityOut)
 /** @brief best: an entry fires above this logit */
 PARAM_ADD(PARAM_FLOAT, scoreIn, &wantedParams.scoreIn)
 /** @brief best: an exit fires above this logit */
 PARAM_ADD(PARAM_FLOAT, scoreOut, &wantedParams.scoreOut)
-/** @brief paper: at least so long between two edges, 10 to 1000 [10 ms] */
+/** @brief paper: at least so long between two edges, 10 to 1000; 150 in paper-stream means its own [10 ms] */
 PARAM_ADD(PARAM_UINT16, probDwell, &wantedParams.probabilityDwell)
-/** @brief filter: an FR-CFAR alert vouches for edges so long, 1 to 1000 [10 ms] */
+/** @brief filter: an FR-CFAR alert vouches for edges so long, 1 to 1000; 100 in paper-stream means its own [10 ms] */
 PARAM_ADD(PARAM_UINT16, alertHold, &wantedParams.alertHold)
 PARAM_GROUP_STOP(airtouch)

@@ -7,6 +7,7 @@ be checked.
 from dataclasses import dataclass
 
 REPRODUCED, NOT_REPRODUCED, UNTESTABLE = "reproduced", "not reproduced", "cannot be tested here"
+UNDECIDED = "undecided"  #: the interval is too wide for either answer
 
 
 @dataclass(frozen=True)

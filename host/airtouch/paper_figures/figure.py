@@ -32,7 +32,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict (reproduced, not reproduced, cannot be tested here) and the figures behind it, with n and interval."""
+    """A verdict of `claims` (reproduced, undecided, ...) and the figures behind it, with n and interval."""
 
     verdict: str
     evidence: str

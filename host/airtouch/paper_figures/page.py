@@ -8,10 +8,10 @@ from typing import Any
 
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
-from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNTESTABLE
+from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNDECIDED, UNTESTABLE
 from airtouch.report.html_page import data_url, rendered
 
-CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNTESTABLE: "open"}
+CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNDECIDED: "open", UNTESTABLE: "open"}
 
 
 def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:

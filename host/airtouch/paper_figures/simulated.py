@@ -17,6 +17,7 @@ from airtouch.logs.edges import Edge
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, scenario
 from airtouch.simulation.flight import Diverged
+from airtouch.simulation.flight_plan import world
 
 SEED = 9  #: seed of every batch of flights here; arbitrary
 SPARE = 2  #: most flights simulated for each one returned; the rest diverged
@@ -59,16 +60,9 @@ def crossings(log: FlightLog) -> list[Edge]:
     For platforms level with the floor, which the down range does not show. On a rotated platform y counts too.
     """
     plan = scenario.draw_flight(scenario.load(log.meta["scenario"]), log.meta["seed"], log.meta["flight"])
-    over = inside(plan.world.corners[plan.world.first[0]:plan.world.first[1]], log["x_m"], log["y_m"])
+    over = world.inside(plan.world.corners[plan.world.first[0]:plan.world.first[1]], log["x_m"], log["y_m"])
     steps = np.flatnonzero(np.diff(over.astype(int))) + 1
     return [Edge(int(s), "entry" if over[s] else "exit", np.nan, np.nan) for s in steps]
-
-
-def inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """True for positions inside a convex polygon, (n,) bool; corners (k, 2) anticlockwise."""
-    ahead = np.roll(corners, -1, axis=0) - corners
-    side = [ahead[i, 0] * (y - corners[i, 1]) - ahead[i, 1] * (x - corners[i, 0]) for i in range(len(corners))]
-    return np.all(np.array(side) >= 0.0, axis=0)
 
 
 def with_truth(log: FlightLog, edges: Callable[[FlightLog], list[Edge]] = crossings) -> FlightLog:

@@ -1,12 +1,15 @@
 """Values with intervals as text, and the rules by which a claim counts as reproduced."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED
+from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNDECIDED
 from airtouch.paper_figures.figure import Verdict
 
 MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
+#: Margins within which the 95 % interval of a difference must lie for "the same" or "reached". No source: chosen.
+ERROR_MARGIN = 0.25  #: of a mean error, as a fraction of it
+SHARE_MARGIN = 0.10  #: of a share: of edges missed, of edges within a distance
 
 
 def metres(row: Mapping[str, Any]) -> str:
@@ -33,28 +36,60 @@ def misses(row: Mapping[str, Any]) -> str:
 
 
 def score(row: Mapping[str, Any]) -> str:
-    """Error, misses and false edges side by side."""
-    return f"{metres(row)}, {misses(row)}, {row['false_per_minute'] or 0:.1f} false a minute"
+    """Error, misses and false edges side by side; "-" where the number of false edges is unknown."""
+    false = row["false_per_minute"]
+    return f"{metres(row)}, {misses(row)}, {'-' if false is None else f'{false:.1f}'} false a minute"
 
 
-def reaches(row: Mapping[str, Any], error_m: float) -> bool:
-    """True if the 95 % interval of the mean error reaches the paper's error, with MOST_MISSED missed at most."""
-    interval = row["intervals"]["mean_abs_error_m"]
-    value = row["mean_abs_error_m"]
-    if value is None or row["missed"] > MOST_MISSED:
+def reaches(row: Mapping[str, Any], error_m: float) -> bool | None:
+    """Whether the mean error is as small as the paper's, with MOST_MISSED missed at most; None for undecided.
+
+    Yes: the 95 % interval ends within ERROR_MARGIN above the paper's error. No: it begins above the paper's error.
+    """
+    interval, value = row["intervals"]["mean_abs_error_m"], row["mean_abs_error_m"]
+    if value is None or row["missed"] > MOST_MISSED or (interval or (value,))[0] > error_m:
         return False
-    return (interval[0] if interval else value) <= error_m
+    return True if interval and interval[1] <= (1.0 + ERROR_MARGIN) * error_m else None
 
 
-def worse(first: dict, second: dict) -> bool:
-    """True if the second has a larger error or more misses than the first, with disjoint 95 % intervals."""
-    return any(a is not None and b is not None and b[0] > a[1]
-               for a, b in ((first["intervals"][k], second["intervals"][k]) for k in ("mean_abs_error_m", "missed")))
+def worse(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool | None:
+    """Whether the second has a larger error or more misses than the first; None for undecided.
+
+    Yes: the 95 % intervals of either are disjoint. No: the second's ends within the margin (ERROR_MARGIN of the first's
+    error, SHARE_MARGIN) above the beginning of the first's, in both.
+    """
+    answers = []
+    for key, margin in (("mean_abs_error_m", ERROR_MARGIN * (first["mean_abs_error_m"] or 0.0)),
+                        ("missed", SHARE_MARGIN)):
+        a, b = first["intervals"][key], second["intervals"][key]
+        answers.append(None if a is None or b is None else decided(b[0] > a[1], b[1] - a[0] <= margin))
+    return any_of(answers)
 
 
-def verdict(yes: bool, evidence: str) -> Verdict:
-    """The verdict "reproduced" or "not reproduced", with the figures behind it."""
-    return Verdict(REPRODUCED if yes else NOT_REPRODUCED, evidence)
+def decided(yes: bool, no: bool) -> bool | None:
+    """True for yes, False for no and not yes, None for neither."""
+    return True if yes else False if no else None
+
+
+def any_of(answers: Iterable[bool | None]) -> bool | None:
+    """True if any answer is True, False if all are False, else None: undecided."""
+    answers = list(answers)
+    return decided(any(a is True for a in answers), all(a is False for a in answers))
+
+
+def all_of(answers: Iterable[bool | None]) -> bool | None:
+    """False if any answer is False, True if all are True, else None: undecided."""
+    return inverse(any_of(inverse(a) for a in answers))
+
+
+def inverse(answer: bool | None) -> bool | None:
+    """The opposite answer; undecided stays undecided."""
+    return None if answer is None else not answer
+
+
+def verdict(answer: bool | None, evidence: str) -> Verdict:
+    """The verdict "reproduced", "not reproduced", or for None "undecided", with the figures behind it."""
+    return Verdict(UNDECIDED if answer is None else REPRODUCED if answer else NOT_REPRODUCED, evidence)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class EdgeEvents:
     band_power (n, 9): (m/s^2)^2, (rad/s)^2, PWM^2; features (n, 3): their fusion; NaN before the first.
     force (n, 3) N; force_norm (n,) N; cfar_power (n,): the cell under test; threshold (n,).
     alert, alert_recent (n,) bool; edge (n,): NONE, ENTRY or EXIT; filtered (n,) bool: an edge was dropped.
-    armed (n,) bool; non_finite (n,): samples replaced so far.
+    armed (n,) bool; non_finite (n,): values replaced so far, up to 10 a sample.
     """
 
     ready: np.ndarray

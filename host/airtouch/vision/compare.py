@@ -80,16 +80,18 @@ def without_lag(by_film: Sequence[Sequence[Detection]], samples: float) -> list[
     return [[replace(d, sample=round(d.sample - samples)) for d in of_film] for of_film in by_film]
 
 
-def airtouch_crossings(films: Sequence[Film], name: str) -> list[list[Detection]]:
-    """Crossings of each film by the shipped model of a detector, less its lag, within the film."""
+def airtouch_crossings(films: Sequence[Film], name: str, training: int) -> list[list[Detection]]:
+    """Crossings of each film by the shipped model of a detector, within the film, less its lag.
+
+    The lag is that on the first `training` films, as for the camera, or without an edge there the model's own.
+    """
     detector = registry.get(name)
     model = detector.load(None)
-    late = detector.lag_s(model) / SAMPLE_PERIOD_S
-    by_film = []
-    for shot in films:
-        moved = [replace(d, sample=round(d.sample - late)) for d in detector.run(shot.log, model).edges]
-        by_film.append([d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s])
-    return by_film
+    reported = [detector.run(shot.log, model).edges for shot in films]
+    late = tuning.lag(((shot.edges, detected) for shot, detected in
+                       zip(films[:training], reported[:training], strict=True)), detector.lag_s(model))
+    return [[d for d in moved if shot.first_s <= d.sample * SAMPLE_PERIOD_S <= shot.last_s]
+            for shot, moved in zip(films, without_lag(reported, late / SAMPLE_PERIOD_S), strict=True)]
 
 
 def flight_scores(films: Sequence[Film], by_film: Sequence[Sequence[Detection]]) -> list[FlightScore]:

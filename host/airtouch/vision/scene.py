@@ -11,6 +11,7 @@ from functools import cache
 import cv2
 import numpy as np
 
+from airtouch.simulation.flight_plan.world import inside
 from airtouch.vision.camera import Camera, blur_px
 
 TILE_PX = 512  #: pixels of a texture, repeated over the plane
@@ -74,22 +75,13 @@ def view(camera: Camera, pose: Pose, scene: Scene) -> np.ndarray:
     on_top = np.zeros((camera.height, camera.width), bool)
     if pose.place_m[2] > scene.top_m:
         x, y = ground_points(camera, pose, scene.top_m)
-        on_top = over(scene, x, y)
+        on_top = inside(scene.corners_m, x, y)
         if on_top.any():
             top = _sample(scene.top, x, y, TOP_M_PER_PX)
     if on_top.all():
         return top
     floor = _sample(scene.floor, *ground_points(camera, pose, 0.0), FLOOR_M_PER_PX)
     return np.where(on_top, top, floor) if on_top.any() else floor
-
-
-def over(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """True for points within the platform's outline; False for NaN."""
-    ahead = np.roll(scene.corners_m, -1, axis=0) - scene.corners_m
-    inside = np.ones(np.shape(x), bool)
-    for (cx, cy), (dx, dy) in zip(scene.corners_m, ahead, strict=True):
-        inside &= dx * (y - cy) - dy * (x - cx) >= 0.0
-    return inside
 
 
 def subposes(camera: Camera, speed_mps: float, seconds: float, distance_m: float) -> np.ndarray:
@@ -106,10 +98,10 @@ def blur(camera: Camera, poses: Sequence[Pose], scene: Scene) -> np.ndarray:
 def outline(camera: Camera, pose: Pose, scene: Scene, width_px: float = 1.5) -> np.ndarray:
     """(rows, columns) bool: pixels within `width_px` of the platform's rim, for a camera at rest: truth to train on."""
     x, y = ground_points(camera, pose, scene.top_m)
-    inside = over(scene, x, y).astype(np.uint8)
+    top = inside(scene.corners_m, x, y).astype(np.uint8)
     size = 2 * int(np.ceil(width_px)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-    return (cv2.dilate(inside, kernel) - cv2.erode(inside, kernel)) > 0
+    return (cv2.dilate(top, kernel) - cv2.erode(top, kernel)) > 0
 
 
 def _sample(tile: np.ndarray, x: np.ndarray, y: np.ndarray, m_per_px: float) -> np.ndarray:

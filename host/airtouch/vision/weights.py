@@ -25,8 +25,11 @@ def load(name: str) -> tuple[teed.Weights, float]:
 
 
 def digest(settings: str) -> str:
-    """Twelve hexadecimal digits that change with any of the weights and with the settings."""
+    """Twelve hexadecimal digits that change with any of the weights, with the camera's code and with the settings."""
     total = hashlib.sha256(settings.encode())
+    for module in sorted(resources.files("airtouch.vision").iterdir(), key=lambda file: file.name):
+        if module.name.endswith(".py"):
+            total.update(module.read_bytes())
     for name in SIZES:
         for key, values in sorted(load(name)[0].items()):
             total.update(key.encode() + values.tobytes())

@@ -163,3 +163,17 @@ def test_a_gap8_that_knows_no_session_is_not_flooded():
                 body = struct.pack("<BBBBI", 0xA1, 3, 16, packet[3], 0) + struct.pack("<IBB", expected, flags, 0)
                 drone.app.receive(body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF)))
     assert packets <= 51
+
+
+@pytest.mark.parametrize("first", [800, 801])
+def test_no_sample_is_left_without_an_answer_when_the_gap8_falls_silent(flight, first):
+    """The decoder counts answers: one for every second sample, whoever gives it."""
+    _, acc, gyro, pwm = flight
+    drone = Drone("best-gap8")
+    counted = []
+    for i in range(1200):
+        drone.answers = i < first
+        drone.step(acc[i], gyro[i], pwm[i])
+        counted.append(drone.app.log.answers)
+    assert counted[first + 20] == counted[first], "the GAP8 is silent and the STM32 waits"
+    assert counted[1199] - counted[599] == 300

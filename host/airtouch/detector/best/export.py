@@ -43,7 +43,7 @@ def _header(model: BestModel) -> str:
     names = ", ".join(output.name for output in OUTPUTS)
     return f"""// The `best` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {network.channels} motion channels a sample (motion_channels.h), quantised by airtouchStreamQuantisation.
-// Output: logits on every {network.stride}nd sample: {names} (edge_decoder.h).
+// Output: logits on one sample in {network.stride}: {names} (edge_decoder.h).
 #pragma once
 
 #include "kernel_types.h"

@@ -8,7 +8,8 @@ BINS = 10  #: of equal width; Guo et al. 2017 use 15
 def reliability(probability: np.ndarray, over: np.ndarray, bins: int = BINS) -> np.ndarray:
     """Reliability table of P(over), shape (bins, 3), additive over flights.
 
-    probability: (n,) in 0..1, non-finite samples are left out. over: (n,) bool truth.
+    probability: (n,) in 0..1, non-finite samples are left out. over: (n,) bool truth at the same sample; a detector's
+    lag is not subtracted.
     Columns: number of samples, sum of their probabilities, number truly over;
     rows: equal-width bins, the last one closed on both sides.
     """

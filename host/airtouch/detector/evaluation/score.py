@@ -57,8 +57,8 @@ class FlightScore:
     """The score of one flight; everything in it is additive over flights.
 
     false: samples of unmatched detections, None where the true edges are unknown.
-    windows: counts of airborne samples.
-    bins: reliability table, (10, 3). airborne_s: seconds in the air. note: what limits the result, one line.
+    windows: counts of airborne samples, at which the lag is not subtracted.
+    bins: reliability table, (10, 3), likewise. airborne_s: seconds in the air. note: what limits the result, one line.
     in_training: whether the model was trained on this flight. path: of the log, "" in results of an older version.
     """
 
@@ -179,6 +179,8 @@ def score_flight(
     true: edges, or None where the log has no down range; then no detection is called false.
     airborne: (n,) bool. trace: of the detector; its probability of being over a platform, 0.5 and more, predicts it,
     and where it has none (all NaN) the state between its edges does. Edges on the ground count too.
+    lag_s: subtracted from the detections before edges are matched, and from nothing else: windows and bins judge the
+    state at each sample as the detector says it at that sample.
     """
     probability, detections = trace.probability, trace.edges
     airborne_s = float(np.count_nonzero(airborne)) * SAMPLE_PERIOD_S

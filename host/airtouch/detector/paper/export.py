@@ -83,7 +83,7 @@ def _rolling_header(model: Model) -> str:
     return f"""// The `paper-stream` detector: {parameter_bytes(network)} bytes of constants.
 // Input: {columns * channels} fused features a sample, on airtouchRollingScale (fixedScaleApply), then quantised:
 // networkInt8Quantise. rollingInt8Init at stride AIRTOUCH_ROLLING_STRIDE, then rollingInt8Step: {outputs} logits
-// on every {step}th sample, {size.ahead} samples before the window is full. The same network runs over whole windows.
+// on one sample in {step}, {size.ahead} samples before the window is full. The same network runs over whole windows.
 #pragma once
 
 #include "fixed_scale.h"

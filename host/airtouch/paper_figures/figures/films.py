@@ -1,10 +1,13 @@
 """Flights filmed by the rendered camera: crossings of camera, AirTouch and both, for the figures of the camera."""
 
+import hashlib
 import json
 from dataclasses import dataclass
 from typing import Any
 
-from airtouch import extras
+import numpy as np
+
+from airtouch import __version__, extras
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.files import write_bytes
 from airtouch.paper_figures import simulated
@@ -38,11 +41,11 @@ def crossings(job: Job) -> Crossings:
     from airtouch.vision.crossings import film
 
     training_count, scored_count = films_of(job)
-    settings = weights.digest(repr((SCENE, SEED, simulated.SEED, Camera())))
     job.tell(f"{training_count + scored_count} simulated flights, {SCENE}")
     films = [film(log, SEED) for log in simulated.flights(SCENE, training_count + scored_count)]
+    settings = weights.digest(repr((__version__, SEED, Camera(), [film_digest(shot) for shot in films])))
     training, scored = films[:training_count], films[training_count:]
-    airtouch = {name: compare.airtouch_crossings(films, name) for name in AIRTOUCH}
+    airtouch = {name: compare.airtouch_crossings(films, name, training_count) for name in AIRTOUCH}
     camera: dict[tuple[str, float], list] = {}
     for lux in lux_of(job):
         by_method = _camera(job, films, training_count, lux, f"{training_count}_{scored_count}_{lux:g}_{settings}")
@@ -77,6 +80,14 @@ def _camera(job: Job, films: list[Any], training_count: int, lux: float, name: s
         write_bytes(json.dumps(stored).encode(), path, force=True)
     return {method: [[Detection(s, "edge") for s in samples] for samples in by_film]
             for method, by_film in stored.items()}
+
+
+def film_digest(film: Any) -> str:
+    """Hexadecimal digits that change with a film's flight, edges, scene and length."""
+    total = hashlib.sha256(repr((film.edges, film.scene.top_m, film.first_s, film.last_s)).encode())
+    for values in (film.scene.floor, film.scene.top, film.scene.corners_m, *film.log.columns.values()):
+        total.update(np.ascontiguousarray(values).tobytes())
+    return total.hexdigest()
 
 
 def film_scores(films: list[Any], detections: list[Any]) -> list[FlightScore]:

@@ -44,7 +44,7 @@ def against_baseline(job: Job) -> Figure:
     text = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
             f"{words.score(rows['best'])}. Below the baseline's error: "
             + ", ".join(f"{n} {100 * b:.0f} %" for n, b in better.items()))
-    verdict = words.verdict(words.reaches(rows["paper"], ours) and better.get("paper", 0.0) >= gain, text)
+    verdict = words.verdict(words.all_of([words.reaches(rows["paper"], ours), better.get("paper", 0.0) >= gain]), text)
 
     def draw(canvas):
         left, right = canvas.subplots(1, 2)

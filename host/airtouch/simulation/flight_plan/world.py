@@ -66,6 +66,15 @@ def build(platforms: Sequence[Platform], floor: str = "cement") -> World:
     return World(corners, first.astype(np.int64), surface, box)
 
 
+def inside(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """True for positions (any shape) inside a convex polygon; False for NaN. corners: (k, 2), anticlockwise."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    within = np.ones(np.shape(x), bool)
+    for (cx, cy), (dx, dy) in zip(corners, ahead, strict=True):
+        within &= dx * (y - cy) - dy * (x - cx) >= 0.0
+    return within
+
+
 @jit
 def inside_by(corners, start, stop, x, y):
     """Distance from (x, y) to the border of a polygon, m; positive inside, negative outside."""
