@@ -22,8 +22,8 @@ class Drone:
         self.loss, self.answers, self.beats = loss, answers, beats
         self.sent, self.steps = 0, 0
 
-    def step(self, acc, gyro, pwm, **more):
-        edge = self.app.step(acc, gyro, pwm, **more)
+    def step(self, acc, gyro, pwm):
+        edge = self.app.step(acc, gyro, pwm)
         self.steps += 1
         if self.steps % 50 == 0:
             beat = self.gap8.heartbeat(10 * self.steps)

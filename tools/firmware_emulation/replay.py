@@ -10,7 +10,7 @@ from airtouch import vehicle as vehicles
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
 from airtouch.kernels.app_core import EDGES, AppCore
-from airtouch.logs.flight_log import ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.flight_log import ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.sitl.app import LOGS, PARAMS
 
 from .board import REPLAY, Board
@@ -58,13 +58,11 @@ def rows(log: FlightLog) -> np.ndarray:
         raise AirTouchError(f"{log.meta.get('source', 'the flight')} has no {', '.join(missing)}: the app needs "
                             "acceleration, "
                             "rates and motors; fly with the log configuration of host/docs/collect.md")
-    world = log.has(*ACC_WORLD)
-    acc, n = (log.stack(ACC_WORLD) if world else level_acceleration(log)) / float(GRAVITY), len(log)
+    acc, n = level_acceleration(log) / float(GRAVITY), len(log)
     acc[:, 2] -= 1.0
     attitude = np.tile([0.0, 0.0, 0.0, 1.0], (n, 1))
     if log.has(*ATTITUDE):
-        angles = np.nan_to_num(log.stack(ATTITUDE)) * (1.0, 1.0, float(world))  # level axes have no yaw to turn by
-        (sr, sp, sy), (cr, cp, cy) = (f(0.5 * angles.T) for f in (np.sin, np.cos))
+        (sr, sp, sy), (cr, cp, cy) = (f(0.5 * np.nan_to_num(log.stack(ATTITUDE)).T) for f in (np.sin, np.cos))
         attitude = np.column_stack([sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
                                     cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy])
     volts = log["vbat_V"] if log.has("vbat_V") else np.full(n, np.nan)

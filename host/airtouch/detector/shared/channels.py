@@ -5,7 +5,6 @@ from collections.abc import Collection
 import numpy as np
 
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
-from airtouch.reference.finite import hold_finite
 
 ACCELERATIONS, RATES, DIFFERENCES = ("ax", "ay", "az"), ("gyro x", "gyro y", "gyro z"), ("m2-m1", "m3-m1", "m4-m1")
 #: Names of the columns of `nine_channels`.
@@ -44,14 +43,13 @@ def logged_channels(log: FlightLog, missing: Collection[str]) -> tuple[list[str]
 
 
 def level_acceleration(log: FlightLog) -> np.ndarray:
-    """(n, 3) specific force, m/s^2, +g in z at rest, in level axes with x towards the nose, as on the drone.
+    """(n, 3) specific force, m/s^2, +g in z at rest: world axes where logged.
 
-    World axes are turned by the yaw. Where no yaw is logged, it counts as 0: the result then depends on the heading.
-    Without world axes: body accelerations turned level by roll and pitch where those are logged, else body
-    accelerations as they are. Raises AirTouchError without any. Source: firmware/app/core/app_level.c.
+    Else body accelerations turned level by roll and pitch where those are logged,
+    else body accelerations as they are. Raises AirTouchError without any.
     """
     if log.has(*ACC_WORLD):
-        return _yaw_removed(log)
+        return log.stack(ACC_WORLD)
     body = log.stack(ACC)
     if not log.has(*ATTITUDE[:2]):
         return body
@@ -70,14 +68,11 @@ def thrust_axis(log: FlightLog) -> np.ndarray | None:
     if not log.has(*ATTITUDE[:2]):
         return None
     roll, pitch = np.nan_to_num(log["roll_rad"]), np.nan_to_num(log["pitch_rad"])
-    return np.column_stack([np.sin(pitch) * np.cos(roll), -np.sin(roll), np.cos(pitch) * np.cos(roll)])
-
-
-def _yaw_removed(log: FlightLog) -> np.ndarray:
-    """(n, 3) logged world acceleration, turned about z so that x is towards the nose. A missing yaw is the last one."""
-    world = log.stack(ACC_WORLD)
-    if not log.has(ATTITUDE[2]):
-        return world
-    yaw = hold_finite(log[ATTITUDE[2]])[0]
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.column_stack([cos * world[:, 0] + sin * world[:, 1], cos * world[:, 1] - sin * world[:, 0], world[:, 2]])
+    turned = log.has(*ACC_WORLD) and log.has("yaw_rad")
+    yaw = np.nan_to_num(log["yaw_rad"]) if turned else np.zeros(len(log))
+    forward = np.sin(pitch) * np.cos(roll)
+    return np.column_stack([
+        np.cos(yaw) * forward + np.sin(yaw) * np.sin(roll),
+        np.sin(yaw) * forward - np.cos(yaw) * np.sin(roll),
+        np.cos(pitch) * np.cos(roll),
+    ])
