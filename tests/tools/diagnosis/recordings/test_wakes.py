@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
-from tools.diagnosis.recordings.wakes import false_alarms, known_seconds, tracks, without_seconds
+from tools.diagnosis.recordings.wakes import false_alarms, known_seconds, tracks, with_labels, without_seconds
 
 
 def window(cf="cf50", start_s=0.0, place=(0.0, 0.0, 0.5), n=1000, force=0.0):
@@ -160,3 +160,23 @@ def test_measures_without_seconds_are_held_against_nominal_flights_of_the_vehicl
     assert [row.split(" | ")[1] for row in rows] == list(measures)
     assert [row.split(" | ")[2][:4] for row in rows] == ["1.00", "0.50", "0.75", "0.00"]
     assert [row.split(" | ")[3] for row in rows] == [f"{n} of 2, of 2 |" for n in (2, 1, 1, 0)]
+
+
+@pytest.mark.parametrize("learner", sorted(with_labels.LEARNERS))
+def test_classifiers_detect_wakes_that_differ_and_no_others(learner):
+    """Of 40 wakes half differ from nominal flights by ten deviations: those are detected, of the others hardly any."""
+    rng = np.random.default_rng(3)
+    wake = np.arange(80) < 40
+    shift = np.where(np.arange(80) < 20, 10.0, 0.0)
+    vehicle = np.where(np.arange(80) % 2 == 0, "34 g", "67 g")
+    numbers = rng.normal(size=(80, 3)) + shift[:, None] + np.where(vehicle == "34 g", 0.0, 100.0)[:, None]
+    relative = with_labels.relative_numbers(numbers, vehicle, wake)
+    assert abs(relative[~wake].mean()) < 0.5 and relative[:20].mean() == pytest.approx(10.0, abs=0.5)
+    hit = with_labels.detected(with_labels.held_out_scores(relative, wake, np.arange(80) // 4, learner), wake)
+    assert hit[:20].all() and hit[20:40].sum() < 8 and not hit[40:].any()
+
+
+def test_the_limit_leaves_one_nominal_flight_in_twenty_beyond_it():
+    """Of 40 nominal flights with the scores 0 to 39 the limit is at 37; of the wakes those above it are detected."""
+    scores, wake = np.concatenate([np.arange(40.0), [36.5, 37.5]]), np.arange(42) >= 40
+    assert list(np.flatnonzero(with_labels.detected(scores, wake))) == [41]
