@@ -71,7 +71,7 @@ def test_intake_gives_every_column_that_it_names():
         if len(times):
             assert sorted(columns) == sorted(n for n in intake.names if n != "t_s")
             assert {len(v) for v in columns.values()} == {len(times)}
-    assert intake.supervisor == 0b11111 and intake.latest["x_m"] == 0.0
+    assert intake.supervisor == 0b1111 and intake.latest["x_m"] == 0.0
 
 
 def test_gaps_become_missing_rows_for_the_detector_and_nothing_else():
