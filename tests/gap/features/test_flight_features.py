@@ -4,19 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from airtouch.gap.features import coherence, edge_steps, flight_features, moments
 from airtouch.gap.features.feature_space import cholesky_factor
-from airtouch.gap.features.flight_signals import (
-    ANGLE_RESIDUAL,
-    COLUMNS,
-    COMMAND,
-    LIFT,
-    RANGE_RESIDUAL,
-    SPEED_RESIDUAL,
-    signals_of,
-)
+from airtouch.gap.features.flight_signals import COLUMNS, COMMAND, LIFT, signals_of
 from airtouch.gap.flights.flight import ready
 from airtouch.logs.flight_log import FlightLog
 from gap_flights import VEHICLE, fly
@@ -107,49 +98,3 @@ def test_without_a_block_in_the_air_nothing_is_told(flight):
     signals = signals_of(flight, VEHICLE)
     nowhere = replace(signals.flight, usable=np.zeros(len(signals.flight), bool))
     assert np.isnan(coherence.coherence(replace(signals, flight=nowhere))).all()
-
-
-def test_the_estimator_leaves_nothing_open_where_its_state_is_the_motion(flight):
-    """A curve flown at a tilt that changes, in closed form: velocity, attitude and range follow from IMU and climb."""
-    t = np.arange(len(flight.log)) / 100.0
-    roll, pitch, yaw = 0.2 * np.sin(3.0 * t), 0.15 * np.cos(2.0 * t), 0.8 * t
-    as_rotation = Rotation.from_euler("ZYX", np.column_stack([yaw, pitch, roll]))
-    speed = np.column_stack([np.cos(0.8 * t), np.sin(0.8 * t), 0.2 * np.sin(t)])
-    push = np.column_stack([-0.8 * np.sin(0.8 * t), 0.8 * np.cos(0.8 * t), 0.2 * np.cos(t) + VEHICLE.gravity_mps2])
-    half = (as_rotation[:-1].inv() * as_rotation[1:]).as_rotvec() * 100.0  # between two samples
-    rates = np.vstack([half[:1], 0.5 * (half[1:] + half[:-1]), half[-1:]])
-    height = 0.6 - 0.2 * np.cos(t)
-    columns = {**flight.log.columns, "roll_rad": roll, "pitch_rad": pitch, "yaw_rad": yaw + 2.0,
-               "zrange_m": height / (np.cos(roll) * np.cos(pitch)), "z_m": height,
-               **dict(zip(("vx_mps", "vy_mps", "vz_mps"), (as_turned(speed, 2.0)).T, strict=True)),
-               **dict(zip(("acc_x_mps2", "acc_y_mps2", "acc_z_mps2"), as_rotation.inv().apply(push).T, strict=True)),
-               **dict(zip(("gyro_x_radps", "gyro_y_radps", "gyro_z_radps"), rates.T, strict=True))}
-    signals = signals_of(ready(FlightLog(columns, flight.log.meta), VEHICLE), VEHICLE)
-    middle = signals.table[10:-10]
-    assert np.abs(middle[:, SPEED_RESIDUAL]).max() < 0.05  # of 3 m/s^2: differences over 10 ms
-    assert np.abs(middle[:, ANGLE_RESIDUAL]).max() < 0.01
-    assert np.abs(middle[:, RANGE_RESIDUAL]).max() < 0.01
-    assert signals.angles[:, 2] == pytest.approx(0.8 * t, abs=1e-9)  # no absolute heading
-
-
-def as_turned(values, yaw):
-    """Vectors (n, 3) turned by an angle about the vertical."""
-    return Rotation.from_euler("z", yaw).apply(values)
-
-
-def test_the_heading_of_the_room_is_no_feature(flight):
-    """A room turned by 140 degrees about the vertical: no feature moves but those that follow the room's own axes."""
-    turned = {**flight.log.columns, "yaw_rad": wrapped(flight.log["yaw_rad"] + np.radians(140.0))}
-    for x, y in (("x_m", "y_m"), ("vx_mps", "vy_mps")):
-        along = np.column_stack([flight.log[x], flight.log[y], np.zeros(len(flight.log))])
-        turned[x], turned[y], _ = as_turned(along, np.radians(140.0)).T
-    before, after = (flight_features.features(ready(FlightLog(c, flight.log.meta), VEHICLE), VEHICLE)
-                     for c in (flight.log.columns, turned))
-    moved = ~np.isclose(after, before, rtol=1e-6, atol=1e-6, equal_nan=True)
-    names = np.array([f.name for f in flight_features.declared_features()])
-    assert not [n for n in names[moved] if "world" not in n]
-
-
-def wrapped(angle):
-    """An angle within half a turn, as estimators log it."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi

@@ -80,7 +80,7 @@ def _means(signals: FlightSignals, samples: np.ndarray) -> np.ndarray:
 def _of_phase(signals: FlightSignals, phase: int) -> np.ndarray:
     """`_means`, those of angles, velocity, rates and range, and log variances of the part faster than 0.5 s."""
     in_phase = signals.air & (signals.flight.phase == phase)
-    samples = in_phase if in_phase.sum() >= FEWEST_IN_PHASE else signals.air
+    samples = in_phase if in_phase.sum() > FEWEST_IN_PHASE else signals.air
     assert signals.flight.rates is not None
     slow = [x[samples].mean(axis=0) for x in (signals.angles, signals.velocity, signals.flight.rates,
                                               signals.table[:, RANGE_RESIDUAL])]

@@ -37,7 +37,7 @@ def attitude(log: FlightLog) -> np.ndarray:
     estimate = np.zeros((n, 3))
     turned = np.cumsum(interpolate_missing(log.stack(GYRO)), axis=0) * PERIOD_S if log.has(*GYRO) else None
     if log.has("yaw_rad"):
-        estimate[:, 2] = logged_angle(log["yaw_rad"])
+        estimate[:, 2] = _logged_angle(log["yaw_rad"])
     elif turned is not None:
         estimate[:, 2] = turned[:, 2] - turned[0, 2]
     tilt = _tilt(log, estimate[:, 2])
@@ -50,11 +50,11 @@ def attitude(log: FlightLog) -> np.ndarray:
         estimate[:, :2] = tilt
     for i, name in enumerate(ATTITUDE[:2]):
         if log.has(name):
-            estimate[:, i] = logged_angle(log[name])
+            estimate[:, i] = _logged_angle(log[name])
     return estimate
 
 
-def logged_angle(values: np.ndarray) -> np.ndarray:
+def _logged_angle(values: np.ndarray) -> np.ndarray:
     """A logged angle (n,), rad, without jumps by a turn, straight lines where it is missing."""
     known, out = np.isfinite(values), np.array(values)
     out[known] = np.unwrap(out[known])
