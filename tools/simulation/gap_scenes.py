@@ -14,16 +14,15 @@ import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from itertools import islice
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.arguments import whole_number
-from airtouch.errors import AirTouchError, in_one_line
+from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.sealed.intervals import share_text
-from airtouch.gap.sealed.make import VEHICLE, stripped
+from airtouch.gap.sealed.make import VEHICLE, ending_well
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch, effects, scenario
@@ -39,10 +38,7 @@ def flown(scene: str, count: int, seed: int, effect: str = "") -> list[FlightLog
     """So many flights that end well, without what the simulator alone knows; AirTouchError where there are fewer."""
     pairs = [effects.parse(effect)] if effect else []
     flights = batch.flights(scene, range(3 * count), vehicle=VEHICLE, effects=pairs, seed=seed, workers=1)
-    logs = [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
-    if len(logs) < count:
-        raise AirTouchError(f"{scene} {effect}: of {3 * count} flights {len(logs)} end well, fewer than {count}")
-    return logs
+    return ending_well(flights, count, f"{scene} {effect}: of {3 * count} flights")
 
 
 def answers(task: tuple[str, int, int]) -> list[tuple[str, str, float]]:

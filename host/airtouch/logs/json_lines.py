@@ -1,6 +1,7 @@
 """JSON objects, one a line, to which a long run appends each result, so that it can go on where it stopped."""
 
 import json
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,9 @@ def append(path: Path | None, objects: Iterable[dict[str, Any]]) -> None:
     A last line that a kill cut short stays a line of its own.
     """
     if path is not None:
-        cut = path.exists() and path.read_bytes()[-1:] not in (b"", b"\n")
-        with path.open("a", encoding="utf-8") as out:
-            out.write("\n" * cut)
-            out.writelines(json.dumps(one) + "\n" for one in objects)
+        with path.open("ab+") as file:
+            end = file.seek(0, os.SEEK_END)
+            file.seek(max(end - 1, 0))
+            if file.read(1) not in (b"", b"\n"):
+                file.write(b"\n")
+            file.writelines(json.dumps(one).encode() + b"\n" for one in objects)

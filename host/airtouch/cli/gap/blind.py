@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from airtouch.cli import Suggesting
 from airtouch.cli.gap.options import check_free, runner, written
@@ -68,15 +67,15 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 @blind.command("run", epilog=examples(
     "airtouch gap blind run check --flights 160 --seed 7"))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
-@click.option("--flights", "-n", default=480, show_default=True, type=click.IntRange(1),
+@click.option("--flights", "-n", show_default="480", type=click.IntRange(1),
               help="How many flights; 42 % have one effect, 42 % none, the rest two.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@click.option("--seed", show_default="0", type=click.IntRange(0), help="Of the whole set.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure; default: OUT/figures.json.")
 @click.option("--force", is_flag=True, help="Replace the file of --json.")
-def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None, json_path: Path | None,
+def blind_run(out: Path, flights: int | None, seed: int | None, workers: int, dask: str | None, json_path: Path | None,
               force: bool) -> None:
     """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
 
@@ -91,15 +90,13 @@ def blind_run(out: Path, flights: int, seed: int, workers: int, dask: str | None
         check_free(out / "figures.json", out / "figures.png", force)
     spread = runner(dask, ()) if dask else None
     make_folder(out)
-    if not (out / "sealed.json").exists():
-        click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
-    source = click.get_current_context().get_parameter_source
-    asked = [None if source(name) == ParameterSource.DEFAULT else value
-             for name, value in (("flights", flights), ("seed", seed))]
-    with Bar() as bar:
-        from airtouch.gap.sealed import run as check
+    from airtouch.gap.sealed import run as check
 
-        figures = check.run(out, *asked, workers=workers, mapper=spread, progress=bar)
+    if not (out / "sealed.json").exists():
+        click.echo(f"{flights or check.FLIGHTS} flights; first the strengths of every effect, which take "
+                   f"{SEVERITIES_TAKE}", err=True)
+    with Bar() as bar:
+        figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 

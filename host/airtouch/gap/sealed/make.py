@@ -6,7 +6,7 @@ A set is a folder: `vehicle.toml`, `cal_*` flights free of effects, `flight_*` f
 
 import re
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from itertools import combinations, islice
 from pathlib import Path
@@ -28,6 +28,7 @@ from airtouch.logs.files import write, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.batch import flights as flown
 from airtouch.simulation.effects import Active, get
+from airtouch.simulation.flight import Diverged
 from airtouch.vehicle import Vehicle, load
 
 SCENARIO, VEHICLE = "diagnosis", "crazyflie-2.1-flow"
@@ -131,10 +132,14 @@ def stripped(log: FlightLog) -> FlightLog:
 def nominal(vehicle: Vehicle, first: int, count: int, seed: int) -> list[FlightLog]:
     """Flights free of effects that end well, from a number on; AirTouchError is raised where too few of them do."""
     flights = flown(SCENARIO, range(first, first + MOST_FLOWN * count), vehicle=vehicle, seed=seed, workers=1)
+    return ending_well(flights, count, f"{SCENARIO}: of {MOST_FLOWN * count} flights without an effect")
+
+
+def ending_well(flights: Iterable[FlightLog | Diverged], count: int, what: str) -> list[FlightLog]:
+    """The first flights that end well, `stripped`; AirTouchError where fewer than count do. what: flights, in words."""
     logs = [stripped(log) for log in islice((x for x in flights if isinstance(x, FlightLog)), count)]
     if len(logs) < count:
-        raise AirTouchError(f"{SCENARIO}: of {MOST_FLOWN * count} flights without an effect {len(logs)} end well, "
-                            f"fewer than {count}")
+        raise AirTouchError(f"{what} {len(logs)} end well, fewer than {count}")
     return logs
 
 
