@@ -79,7 +79,7 @@ NOT_NEGATIVE = {"acc_noise_rms_mps2", "gyro_noise_rms_radps", "range_noise_rms_m
                 "gyro_bandwidth_hz", "acc_noise_ratio", "gyro_noise_ratio", "flow_noise_mps", "rotor_drag_kg_per_rad",
                 "voltage_exponent", "thrust_per_speed2", "rotor_inertia_kg_m2", "motor_fall_time_constant_s",
                 "battery_resistance_ohm", "power_per_thrust15", "thrust_base_pwm", "arm_pwm"}
-FULL_PWM = 65535.0
+FULL_PWM = 65535.0  #: the largest command, 16 bits
 RANGE_MODULES = ("map", "platform", "none", "firmware")
 
 

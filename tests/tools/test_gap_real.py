@@ -62,11 +62,11 @@ def test_a_result_of_another_version_of_the_code_is_none(tmp_path, diagnosed, mo
 
 
 def test_quick_needs_a_flight_of_each_of_its_kinds():
-    every = [cases.Case(row, truth, "v", f"{i}.csv", ()) for (row, truth), n in gap_real.QUICK.items()
-             for i in range(n)]
-    assert len(gap_real.quick(every)) == sum(gap_real.QUICK.values())
+    of_each_kind = [cases.Case(row, truth, "v", f"{i}.csv", ()) for (row, truth), n in gap_real.QUICK.items()
+                    for i in range(n)]
+    assert len(gap_real.quick(of_each_kind)) == sum(gap_real.QUICK.values())
     with pytest.raises(AirTouchError, match="swarm: 0 flights of ground_effect"):
-        gap_real.quick(every[1:])
+        gap_real.quick(of_each_kind[1:])
 
 
 def test_a_refusal_is_not_kept_and_one_that_was_kept_is_no_result(tmp_path, diagnosed):

@@ -22,8 +22,8 @@ def test_airtouchs_lag_is_that_on_the_training_films(monkeypatch, late):
         load=lambda _: None, lag_s=lambda _: 0.2,
         run=lambda edges, _: SimpleNamespace(edges=[Detection(e.sample + late, "edge") for e in edges]))
     monkeypatch.setattr(compare.registry, "get", lambda _: detector)
-    found = compare.airtouch_crossings(films, "made", 2)
-    assert [[d.sample for d in of_film] for of_film in found] == [[e.sample for e in f.edges] for f in films]
+    crossings = compare.airtouch_crossings(films, "made", 2)
+    assert [[d.sample for d in of_film] for of_film in crossings] == [[e.sample for e in f.edges] for f in films]
     without_edges = [shot(300)]
     without_edges[0].edges = ()
     assert compare.airtouch_crossings(without_edges, "made", 1)[0][0].sample == 300 + late - 20  # the model's own lag

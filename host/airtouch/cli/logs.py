@@ -112,13 +112,13 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     make_folder(folder)
     written: set[Path] = set()
     inputs = _inputs(files)
-    kept = {os.path.realpath(path) for path in inputs[0]}
+    input_files = {os.path.realpath(path) for path in inputs[0]}
 
     def one(path: Path) -> Path:
         target = folder / f"{_stem(path)}.{ending}"
         if target in written:
             raise AirTouchError(f"{path}: another file of this call is {target} already; rename one of them")
-        if os.path.realpath(target) in kept:
+        if os.path.realpath(target) in input_files:
             raise AirTouchError(f"{path}: its conversion would replace {target}, a file to convert; choose another "
                                 "--out")
         log = mapped.read(path, mapping) if mapping else logs.read(path)

@@ -43,8 +43,8 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
     """Make every table and figure of the paper's evaluation again, with the paper's method and with `best`.
 
     Recorded flights where they exist, the simulator where they do not; each caption says which. The page sets the
-    paper's numbers beside ours and gives a verdict on each claim: reproduced, not reproduced,
-    undecided, cannot be tested here.
+    paper's numbers beside ours and gives a verdict on each claim: reproduced, not reproduced, undecided, cannot be
+    tested here.
 
     \b
     airtouch paper --quick                       # a first look

@@ -19,10 +19,10 @@ from skips import needs
 @pytest.fixture
 def changed(monkeypatch):
     """The package after the page's changes: `layer2` reads one row, and there is a fourth output."""
-    given = Recipe.graph.fget
+    shipped_graph = Recipe.graph.fget
 
     def graph(self):
-        layers = list(given(self))
+        layers = list(shipped_graph(self))
         layers[2] = StreamLayer("layer2", CONV, 1, self.width, self.width, pruned=True)
         return tuple(layers)
 

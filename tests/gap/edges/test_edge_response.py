@@ -62,5 +62,5 @@ def test_an_edge_that_is_hit_or_lost_is_no_evidence(name, samples, counts):
     usable[at] = False
     if name == "lost":
         lost[at] = True
-    left = edges_of(replace(flight, usable=usable, lost=lost))
-    assert (edges[0] in left) == counts and set(edges[2:]) <= set(left)
+    of_evidence = edges_of(replace(flight, usable=usable, lost=lost))
+    assert (edges[0] in of_evidence) == counts and set(edges[2:]) <= set(of_evidence)

@@ -42,8 +42,8 @@ def test_the_scatter_of_log_power_is_that_which_flights_have_beyond_chance(nu):
     rng = np.random.default_rng(6)
     scatter, count = 0.2, 4
     floor = powers.power_floor([drawn(nu, 50, scatter, rng) for _ in range(count)])
-    found = np.sqrt(np.mean(floor[1] ** 2) / (1.0 + 1.0 / count))
-    assert found == pytest.approx(scatter, rel=0.05)
+    estimate = np.sqrt(np.mean(floor[1] ** 2) / (1.0 + 1.0 / count))
+    assert estimate == pytest.approx(scatter, rel=0.05)
 
 
 @pytest.mark.parametrize(("simulated", "counted"), [(True, [False, True]), (False, [False, False])])

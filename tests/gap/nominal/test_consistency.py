@@ -98,11 +98,11 @@ def test_a_note_names_the_channel_in_which_a_flight_is_odd():
 def test_of_a_hundred_sets_of_normal_trims_one_gets_a_note(monkeypatch, flights):
     """Six independent channels that scatter by ten times the least distance, so that chance alone decides."""
     rng, noted = np.random.default_rng(flights), 0
-    some = baseline(*np.zeros(flights))
+    nominal = baseline(*np.zeros(flights))
     for _ in range(2000):
         trim = rng.normal(0.0, 10.0 * FAR, (flights, 6))
         monkeypatch.setattr(consistency, "trims", lambda *_, trim=trim: trim)
-        noted += bool(odd_flights(study(), some))
+        noted += bool(odd_flights(study(), nominal))
     assert 0.004 < noted / 2000 < 0.016  # 1 % and three standard errors, less for two odd ones in a set
 
 

@@ -67,8 +67,8 @@ def rank_correlation(x: np.ndarray, y: np.ndarray, neighbours: np.ndarray) -> tu
     degrees = len(a) * (1.0 - q) / (1.0 + q) - 2.0
     if degrees <= 0.0:
         return r, 1.0
-    left = max(1.0 - r * r, 1e-12)
-    return r, float(2.0 * t.sf(abs(r) * np.sqrt(degrees / left), degrees))
+    unexplained = max(1.0 - r * r, 1e-12)  # share of the variance of the ranks
+    return r, float(2.0 * t.sf(abs(r) * np.sqrt(degrees / unexplained), degrees))
 
 
 def _lag_one(values: np.ndarray, neighbours: np.ndarray, fitted: int) -> float:

@@ -37,9 +37,9 @@ class FlightSignals:
     attitude and the down range change beyond what acceleration, gyro and estimated climb say (m/s^2, rad/s, m/s), as if
     the axes did not turn and the beam did not tilt. The shipped library was learned with these: the residuals without
     that approximation were tried and not taken (host/docs/looks.md, 2026-11-27 07:18).
-    velocity (n, 3) m/s, body axes; angles (n, 3) rad, the heading as logged: simulated flights, for which
-    alone the library holds, begin at 0; height (n,) m, estimated; air, rest (n,): samples in flight and standing that
-    nothing touches and no row lacks; flight: without the moments of contact.
+    velocity (n, 3) m/s, body axes; angles (n, 3) rad, the heading as logged: 0 at first in simulated flights, for which
+    alone the library holds; height (n,) m, estimated; air, rest (n,): samples in flight and standing that nothing
+    touches and no row lacks; flight: without the moments of contact.
     """
 
     flight: Flight

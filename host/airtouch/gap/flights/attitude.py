@@ -30,8 +30,7 @@ def attitude(log: FlightLog) -> np.ndarray:
     Each rate of the gyro is integrated as if it were that of its own angle, which holds for small angles. What is left
     out is, for roll, tan(pitch) (q sin(roll) + r cos(roll)), for pitch (cos(roll) - 1) q - r sin(roll), where q and r
     are the rates about the body's y and z: at a tilt of 20 degrees up to 0.36 of the yaw rate. Of it only what changes
-    faster than CROSSOVER_HZ stays in the tilt. The heading that is not
-    logged is the sum of r, without tilt.
+    faster than CROSSOVER_HZ stays in the tilt. A heading that is not logged is the integral of r, as if level.
     """
     n = len(log)
     estimate = np.zeros((n, 3))

@@ -40,8 +40,8 @@ def disturbed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -
     """At frequencies f (bins,), Hz. controllers: of AXES.
 
     The vehicle turns by S of an outside acceleration, S = 1 / (1 + P K), and the log has the command -K_log S / s of
-    it. The yaw loop is the firmware's, at the pace of the roll loop. Raises AirTouchError where
-    its rate has no proportional gain.
+    it. The yaw loop is the firmware's, at the pace of the roll loop. Raises AirTouchError where its rate has no
+    proportional gain.
     """
     f = np.maximum(f, LOWEST_HZ)
     _, roll, pitch = controllers

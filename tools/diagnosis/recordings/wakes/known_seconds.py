@@ -55,7 +55,7 @@ def answers_of(path: Path | None) -> dict[str, str]:
             continue
         if result["flight"] in answers:
             raise AirTouchError(f"{path}: {result['flight']} was diagnosed more than once, as with --partner and "
-                                "without; keep the results of one set of options in a file of its own")
+                                "without, or by two versions; keep the results of one run in a file of its own")
         answers[result["flight"]] = result["effects"][0]["name"] if result["effects"] else result["verdict"]
     return answers
 

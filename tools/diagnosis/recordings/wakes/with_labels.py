@@ -59,10 +59,10 @@ def detected(scores: np.ndarray, wake: np.ndarray) -> np.ndarray:
 def show_with_labels(flights: Path) -> None:
     """Print a line for each learner and each kind of fold: AUROC, wakes detected, and those that are not."""
     scikit("ensemble")  # before the flights are read
-    found = [(Path(case.flight).name, vehicles.load(case.vehicle).name, case.truth == "downwash", numbers_of(data))
-             for case, data in wakes_and_nominal(flights)]
-    files, vehicle, wake = (np.array([f[k] for f in found]) for k in range(3))
-    numbers = relative_numbers(np.array([f[3] for f in found]), vehicle, wake)
+    rows = [(Path(case.flight).name, vehicles.load(case.vehicle).name, case.truth == "downwash", numbers_of(data))
+            for case, data in wakes_and_nominal(flights)]
+    files, vehicle, wake = (np.array([row[k] for row in rows]) for k in range(3))
+    numbers = relative_numbers(np.array([row[3] for row in rows]), vehicle, wake)
     drones = {r["file"]: f"{r['cf']} {r['day']}" for r in swarm_cuts.cuts(flights / "neuralswarm")}
     folds = {"all other flights": np.arange(len(files)), "other drones and days": np.array([drones[f] for f in files])}
     print(f"{len(files)} flights, {wake.sum()} wakes, {numbers.shape[1]} numbers\n"
