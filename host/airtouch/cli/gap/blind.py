@@ -67,9 +67,9 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 @blind.command("run", epilog=examples(
     "airtouch gap blind run check --flights 160 --seed 7"))
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
-@click.option("--flights", "-n", show_default="480", type=click.IntRange(1),
-              help="How many flights; 42 % have one effect, 42 % none, the rest two.")
-@click.option("--seed", show_default="0", type=click.IntRange(0), help="Of the whole set.")
+@click.option("--flights", "-n", type=click.IntRange(1),
+              help="How many flights, by default 480; 42 % have one effect, 42 % none, the rest two.")
+@click.option("--seed", type=click.IntRange(0), help="Of the whole set, by default 0.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
