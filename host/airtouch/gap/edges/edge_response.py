@@ -80,11 +80,11 @@ def edges_of(flight: Flight) -> list[Edge]:
         bridged = flight.bridged[window]
         return bool((flight.usable[window] | bridged).all()) and bridged.mean() <= MOST_BRIDGED
 
-    return flight.workspace.cached("edges", (), lambda: [e for e in _edges_in_air(flight) if is_evidence(e)])
+    return flight.workspace.cached("edges", (), lambda: [e for e in edges_in_air(flight) if is_evidence(e)])
 
 
-def _edges_in_air(flight: Flight) -> list[Edge]:
-    """Edges with enough flight around them, whatever happens there."""
+def edges_in_air(flight: Flight) -> list[Edge]:
+    """Edges with enough flight around them, whatever happens there; the library of relations was learned with these."""
     if not flight.log.has("zrange_m"):
         return []
     air = flight.phase != GROUND
@@ -146,7 +146,7 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
     for f in flights:
         for e in edges_of(f):
             responses[e.kind].append(response(f.log, vehicle, e.sample))
-        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, _edges_in_air(f))]
+        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges_in_air(f))]
     if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
         return None
     known = np.isfinite(np.concatenate([without_edge, *responses.values()])).all(axis=0)

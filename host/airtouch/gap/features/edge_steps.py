@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from airtouch.gap.edges.edge_response import BEFORE, KINDS, UNSURE, edges_of
+from airtouch.gap.edges.edge_response import BEFORE, KINDS, UNSURE, edges_in_air
 from airtouch.gap.features.feature import Feature
 from airtouch.gap.features.flight_signals import (
     COMMAND,
@@ -57,7 +57,7 @@ def edge_steps(signals: FlightSignals) -> np.ndarray:
     Means of each signal in BINS after an edge less that before it, and the step of the down range, m; NaN where the
     flight crosses none of a kind.
     """
-    edges, values = edges_of(signals.flight), np.column_stack([s.values(signals) for s in SIGNALS])
+    edges, values = edges_in_air(signals.flight), np.column_stack([s.values(signals) for s in SIGNALS])
     along, out = np.array([s.along for s in SIGNALS]), []
     for kind in KINDS:
         steps = []
