@@ -61,6 +61,15 @@ def test_an_existing_flight_is_not_flown_over(tmp_path, number):
     assert message == f"{path}: exists already; use --force to replace it" and path.read_bytes() == b"mine"
 
 
+@pytest.fixture
+def ctrl_c():
+    """Ctrl-C as in a terminal: a shell starts what runs in the background with it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_ctrl_c_at_the_question_ends_the_program_before_anything_is_armed(tmp_path, monkeypatch):
     flown = Mock()
     monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", Mock())
