@@ -46,7 +46,8 @@ def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path):
     assert trained.int8.layers[2].weights.shape == (SMALL.width, SMALL.width)
     trained.save(tmp_path / "mine.npz")
     again = best.load(tmp_path / "mine.npz")
-    assert best.run_float(log, again).signals["logits"].shape == (len(log), len(outputs.OUTPUTS)) and best.run(log, again).note == ""
+    assert best.run_float(log, again).signals["logits"].shape == (len(log), len(outputs.OUTPUTS))
+    assert best.run(log, again).note == ""
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
     assert again.c_sources() and CHANNELS == trained.int8.layers[0].weights.shape[1] // SMALL.first_taps
