@@ -21,12 +21,17 @@ def airborne(log: FlightLog) -> np.ndarray:
             power = np.where(there, motors, 0.0).sum(axis=1) / np.maximum(there.sum(axis=1), 1)
         last = np.maximum.accumulate(np.where(there.any(axis=1), np.arange(len(power)), 0))
         return power[last] > DEFAULT.arm_pwm
-    high = log["z_m" if _logged(log, "z_m") and not _logged(log, "zrange_m") else "zrange_m"] > AIRBORNE_RANGE_M
+    high = log[height_column(log)] > AIRBORNE_RANGE_M
     flying = np.zeros(len(log), dtype=bool)
     where = np.flatnonzero(high)
     if len(where):
         flying[where[0]:where[-1] + 1] = True
     return flying
+
+
+def height_column(log: FlightLog) -> str:
+    """The column with the height: `zrange_m`, or `z_m` where that alone holds a value."""
+    return "z_m" if _logged(log, "z_m") and not _logged(log, "zrange_m") else "zrange_m"
 
 
 def _logged(log: FlightLog, name: str) -> bool:
