@@ -3,6 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.in_flight import flies_below_in_words
 from airtouch.logs.segments import KINDS, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
@@ -94,7 +96,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
-                  notes=notes, cannot=cannot)
+                  notes=(*notes, *(f"{Path(name).name}: {w}" for w in flies_below_in_words(log))), cannot=cannot)
 
 
 def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
