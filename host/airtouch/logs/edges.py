@@ -7,6 +7,7 @@ import numpy as np
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
+from airtouch.parameters import DEFAULT
 
 STEP_M = 0.30  #: m, least change of the down range within two samples at an edge
 ROUNDING_M = 1e-6  #: m, added to STEP_M, so that a step of exactly 0.30 m is no edge in floating point
@@ -25,16 +26,16 @@ class Edge:
     height_after_m: float
 
 
-def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
+def true_edges(log: FlightLog, step_m: float = STEP_M, arm_pwm: float = DEFAULT.arm_pwm) -> list[Edge]:
     """True edges of a flight in order of time.
 
     An edge is the first sample at which the down range falls (entry) or rises (exit) by more
     than `step_m` within two samples, in flight. Steps within 0.1 s of it are the sensor settling
     and belong to it. A step that is undone within 0.1 s is a glitch and no edge. Low platforms
-    need a `step_m` below 0.30. Raises AirTouchError for a log without `zrange_m`.
+    need a `step_m` below 0.30. arm_pwm: as of `airborne`. Raises AirTouchError for a log without `zrange_m`.
     """
     height = _filled_forward(log["zrange_m"])
-    steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log))
+    steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log, arm_pwm))
     period = sample_period(log)
     settling = max(int(round(SETTLING_S / period)), 2)
     level = max(int(round(LEVEL_S / period)), 1)
@@ -60,13 +61,13 @@ def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
     return moved
 
 
-def _in_flight(log: FlightLog) -> np.ndarray:
+def _in_flight(log: FlightLog, arm_pwm: float) -> np.ndarray:
     """True where the drone is airborne now and for IN_FLIGHT_S before and after, (n,) bool."""
     margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
     n = len(log)
     if n <= 2 * margin:
         return np.zeros(n, dtype=bool)
-    grounded = np.r_[0, np.cumsum(~airborne(log))]
+    grounded = np.r_[0, np.cumsum(~airborne(log, arm_pwm))]
     place = np.arange(n)
     return grounded[np.minimum(place + margin + 1, n)] == grounded[np.maximum(place - margin, 0)]
 

@@ -9,6 +9,7 @@ from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne, height_column
+from airtouch.parameters import DEFAULT
 
 CRUISE_MPS = 0.1  #: m/s, horizontal speed above which level flight is cruise
 LEAST_HEIGHT_M = 0.05  #: m; a drone that stays below it with its motors on has not taken off
@@ -26,20 +27,20 @@ class Segment:
     stop: int
 
 
-def segments(log: FlightLog) -> list[Segment]:
+def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
     """The phases of a flight in order; every sample is in one of them.
 
     Ground: motors below the airborne level, or never higher than 5 cm where a height was measured. Take-off: until
     85 % of the median height in the air; landing: from the last time at that height.
     Over platform: between an entry and an exit by the down range. The rest is cruise
     where the speed is above 0.1 m/s, else hover; without velocity it is all cruise if
-    the flight crosses an edge, else all hover. Raises AirTouchError for a log with
-    neither PWM nor height.
+    the flight crosses an edge, else all hover. arm_pwm: the airborne level, of a vehicle's
+    file. Raises AirTouchError for a log with neither PWM nor height.
     """
     period = sample_period(log)
-    flying = _without_short_runs(airborne(log), int(0.5 / period))
+    flying = _without_short_runs(airborne(log, arm_pwm), int(0.5 / period))
     kinds = np.zeros(len(log), dtype=np.int8)
-    edges = true_edges(log, PLATFORM_STEP_M) if log.has("zrange_m") else []
+    edges = true_edges(log, PLATFORM_STEP_M, arm_pwm) if log.has("zrange_m") else []
     edges = [e for e in edges if flying[e.sample]]
     ground_height = _height(log, edges)
     at = [e.sample for e in edges]

@@ -79,10 +79,11 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     """
     name = log.source
     log, notes = without_bad_columns(log)
+    notes += tuple(f"{Path(name).name}: {w}" for w in flies_below_in_words(log, vehicle.arm_pwm))
     log, clock, lost = with_lost_rows(at_100_hz(log, name), name)
     if stamped_at_arrival(log):
         clock = np.zeros_like(clock)
-    cannot, phase = cannot_tell(log), _phases(log)
+    cannot, phase = cannot_tell(log), _phases(log, vehicle.arm_pwm)
     ground = phase == GROUND
     _check_long_enough(~ground, name, "in the air")
     angles = attitude(log)
@@ -96,7 +97,7 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
-                  notes=(*notes, *(f"{Path(name).name}: {w}" for w in flies_below_in_words(log))), cannot=cannot)
+                  notes=notes, cannot=cannot)
 
 
 def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
@@ -151,10 +152,10 @@ def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np
     return interpolate_missing(log.stack(ACC))
 
 
-def _phases(log: FlightLog) -> np.ndarray:
+def _phases(log: FlightLog, arm_pwm: float) -> np.ndarray:
     """Phase of each sample, int8 (n,): places in `segments.KINDS`."""
     phase = np.zeros(len(log), np.int8)
-    for part in segments(log):
+    for part in segments(log, arm_pwm):
         phase[part.start:part.stop] = KINDS.index(part.kind)
     return phase
 
