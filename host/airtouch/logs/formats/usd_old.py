@@ -15,7 +15,7 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.usd import TYPES
-from airtouch.logs.variables import to_columns
+from airtouch.logs.variables import ASSUMED, to_columns
 
 TIME = "tick"  #: the variable with the time
 LONGEST_STEP_MS = 500  #: ticks; the deck logs at 1 to 1000 Hz, so with a larger median step ticks are microseconds
@@ -47,7 +47,7 @@ def read(data: bytes, source: str) -> FlightLog:
     table = {name: rows[f"v{i}"].astype(np.float64) for i, name in enumerate(names)}
     if TIME not in table:
         raise AirTouchError(f"{source}: an old uSD log without the variable 'tick' has no time; log it too")
-    meta = {"source": source, "format": "usd-0", "vehicle": "crazyflie-2.1", "condition": "", "warnings": warnings}
+    meta = {"source": source, "format": "usd-0", **ASSUMED, "condition": "", "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
         known = ", ".join(printable(name) for name in names[:6])
