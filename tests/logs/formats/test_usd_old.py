@@ -55,6 +55,14 @@ def test_an_old_file_gives_columns_in_si_units():
     assert log["vbat_V"][0] == pytest.approx(3.9)
 
 
+@pytest.mark.parametrize(("step", "in_doubt"), [(10, False), (500, False), (1000, True), (1004, True), (2000, False)])
+def test_a_step_that_may_be_either_unit_is_warned_of(step, in_doubt):
+    """1000 ticks are 1 kHz in microseconds and 1 Hz in milliseconds: the deck does both."""
+    rows = [struct.pack("<IH", 9000 + step * i, 3900) for i in range(20)]
+    warnings = parse(old_log(rows, ("tick(I)", "pm.vbatMV(H)")), "log00").meta["warnings"]
+    assert any("milliseconds" in w for w in warnings) == in_doubt
+
+
 def test_ticks_in_microseconds_give_seconds():
     rows = [struct.pack("<IH", 9_000_000 + 9890 * i, 3900) for i in range(20)]
     log = parse(old_log(rows, ("tick(I)", "pm.vbatMV(H)")), "log00")
