@@ -16,7 +16,7 @@ def airborne(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> np.ndarray:
     neither.
     """
     power = _mean_pwm(log)
-    if power is not None and not flies_below(log, arm_pwm):
+    if power is not None and ((power > arm_pwm).any() or not flies_below(log, arm_pwm)):
         return power > arm_pwm
     high = log[height_column(log)] > AIRBORNE_RANGE_M
     flying = np.zeros(len(log), dtype=bool)
