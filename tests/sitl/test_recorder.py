@@ -32,12 +32,14 @@ def test_a_session_without_rows_writes_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_existing_file_and_a_missing_folder_are_refused_before_the_session(tmp_path):
+def test_an_existing_file_and_a_folder_that_cannot_be_made_are_refused_before_the_session(tmp_path):
     (tmp_path / "a.csv").write_text("mine")
     with pytest.raises(AirTouchError, match="exists already; use --force"):
         Recorder(tmp_path / "a.csv", "", "", 0, 0, force=False)
-    with pytest.raises(AirTouchError, match="no such folder"):
-        Recorder(tmp_path / "none" / "a.csv", "", "", 0, 0, force=True)
+    with pytest.raises(AirTouchError, match="a.csv: cannot be made"):
+        Recorder(tmp_path / "a.csv" / "b.csv", "", "", 0, 0, force=True)
+    with pytest.raises(AirTouchError, match="is a folder"):
+        Recorder(tmp_path, "", "", 0, 0, force=True)
     Recorder(tmp_path / "a.csv", "", "", 0, 0, force=True)
     assert (tmp_path / "a.csv").read_text() == "mine"  # replaced at the end alone
 

@@ -1,12 +1,14 @@
 """A flight's clock: what is lost, what comes late, and what nobody can tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready_flights, with_gyro_if_any
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
@@ -26,6 +28,23 @@ def without(log, *rows):
 def as_flight(log):
     (flight,) = ready_flights([log], VEHICLE, [])
     return flight
+
+
+def test_motors_below_the_threshold_fly_by_the_height_and_a_note_says_so(log):
+    """Commands of less than 15000, as of a strong vehicle: the diagnosis found no flight in it."""
+    weak = as_flight(log.with_columns({name: log[name] * 14000.0 / log[name].max() for name in PWM}))
+    assert np.flatnonzero(weak.phase != KINDS.index("ground")).size > 0.9 * np.sum(log["zrange_m"] > 0.1)
+    assert any("never passes 15000" in note for note in weak.notes)
+    assert not any("never passes" in note for note in as_flight(log).notes)
+
+
+def test_the_threshold_of_the_vehicle_file_tells_what_is_flight(log):
+    """The same commands, by a vehicle that flies at them and by one that idles."""
+    low = log.with_columns({name: log[name] * 14000.0 / log[name].max() for name in PWM})
+    (armed,) = ready_flights([low], replace(VEHICLE, arm_pwm=3000.0), [])
+    mean = np.mean([low[name] for name in PWM], axis=0)
+    in_air = armed.phase != KINDS.index("ground")
+    assert in_air[mean > 3000.0].mean() > 0.95 and not any("never passes" in note for note in armed.notes)
 
 
 def test_a_row_lost_in_mid_flight_is_lost_and_no_jitter(log):

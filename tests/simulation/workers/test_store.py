@@ -72,6 +72,12 @@ def test_fewer_flights_of_the_same_request_leave_all_of_them_listed(tmp_path):
     assert listed == [p.name for p in logs.files.in_folder(out)] and len(listed) == 2
 
 
+def test_a_manifest_that_cannot_be_read_is_one_line(tmp_path):
+    (tmp_path / "manifest.csv").mkdir()
+    with pytest.raises(AirTouchError, match="manifest.csv: cannot be read"):
+        store.open_folder(tmp_path, {})
+
+
 def test_rows_of_the_manifest_that_the_user_edited_stay(tmp_path):
     (tmp_path / "short.toml").write_text(SHORT)
     request = [str(tmp_path / "short.toml"), "--out", str(tmp_path / "out"), "-n"]

@@ -3,6 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
+from airtouch.logs.in_flight import flies_below_in_words
 from airtouch.logs.segments import KINDS, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
@@ -77,10 +79,11 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     """
     name = log.source
     log, notes = without_bad_columns(log)
+    notes += tuple(f"{Path(name).name}: {w}" for w in flies_below_in_words(log, vehicle.arm_pwm))
     log, clock, lost = with_lost_rows(at_100_hz(log, name), name)
     if stamped_at_arrival(log):
         clock = np.zeros_like(clock)
-    cannot, phase = cannot_tell(log), _phases(log)
+    cannot, phase = cannot_tell(log), _phases(log, vehicle.arm_pwm)
     ground = phase == GROUND
     _check_long_enough(~ground, name, "in the air")
     angles = attitude(log)
@@ -149,10 +152,10 @@ def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np
     return interpolate_missing(log.stack(ACC))
 
 
-def _phases(log: FlightLog) -> np.ndarray:
+def _phases(log: FlightLog, arm_pwm: float) -> np.ndarray:
     """Phase of each sample, int8 (n,): places in `segments.KINDS`."""
     phase = np.zeros(len(log), np.int8)
-    for part in segments(log):
+    for part in segments(log, arm_pwm):
         phase[part.start:part.stop] = KINDS.index(part.kind)
     return phase
 

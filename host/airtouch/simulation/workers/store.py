@@ -17,7 +17,7 @@ from typing import Any
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs import json_lines
-from airtouch.logs.files import MANIFEST, make_folder, read_text
+from airtouch.logs.files import MANIFEST, load_bytes, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
@@ -71,7 +71,7 @@ def check_manifest(folder: Path) -> None:
     path = folder / MANIFEST
     if not path.exists():
         return
-    head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
+    head, *rows = load_bytes(path).decode(errors="replace").splitlines() or [""]
     if head != HEAD or not all(FLIGHT.fullmatch(row.split(",")[0]) for row in rows):
         raise AirTouchError(f"{path}: not written by a simulation, and its flights need another; "
                             "choose another folder, or move it away")
