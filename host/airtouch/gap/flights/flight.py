@@ -15,7 +15,8 @@ from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
-from airtouch.logs.segments import KINDS, segments
+from airtouch.logs.resample import LONGEST_BRIDGE_S
+from airtouch.logs.segments import KINDS, runs, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.body.rotation import as_matrix
@@ -25,6 +26,10 @@ from airtouch.vehicle import Vehicle
 GROUND = KINDS.index("ground")
 #: height above standing, m, below which legs may touch in flight, and seconds before and after it; chosen
 TOUCH_M, TOUCH_S = 0.006, 0.05
+#: samples of a hole in a column up to which a straight line stands for what was measured, as where a log is resampled
+MOST_BRIDGED = round(LONGEST_BRIDGE_S / PERIOD_S)
+HOLE_NOTE = ("{:.1f} s in the air are no evidence: accelerations, rates or motor commands are missing there for more "
+             "than {:g} s at a time; they do not count as lost rows")
 
 
 @dataclass(frozen=True)
@@ -33,10 +38,11 @@ class Flight:
 
     signals (n, simulation.signals.COUNT): what effects see; acceleration (n, 3): specific force in body axes, m/s^2;
     rates (n, 3): of the gyro, rad/s, None without one; pwm (n, 4): motor commands, 16 bits; body_to_world (n, 3, 3):
-    rotation; phase (n,): places in `segments.KINDS`; usable (n,): neither lost nor close to a touch of the ground;
+    rotation; phase (n,): places in `segments.KINDS`; usable (n,): measured, and not close to a touch of the ground;
     clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure; lost (n,):
-    rows that did not arrive; touching (n,): in flight, so low that the legs may touch; notes, cannot: sentences on what
-    was left out of the log, and on what no diagnosis of it can tell.
+    rows that did not arrive; unmeasured (n,): rows that did, in a hole of a column of the IMU or of the motor commands
+    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; notes, cannot:
+    sentences on what was left out of the log, and on what no diagnosis of it can tell.
     """
 
     name: str
@@ -50,6 +56,7 @@ class Flight:
     usable: np.ndarray
     clock_s: np.ndarray
     lost: np.ndarray
+    unmeasured: np.ndarray
     touching: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
@@ -60,8 +67,13 @@ class Flight:
 
     @property
     def bridged(self) -> np.ndarray:
-        """Samples whose residual is not evidence, bool (n,): the row was lost, or the legs may touch the floor."""
-        return self.lost | self.touching
+        """Samples whose residual is not evidence, bool (n,): not measured, or the legs may touch the floor."""
+        return self.not_logged | self.touching
+
+    @property
+    def not_logged(self) -> np.ndarray:
+        """Samples that straight lines stand for, bool (n,): the row was lost, or it lacks what is measured."""
+        return self.lost | self.unmeasured
 
     @property
     def on_ground(self) -> np.ndarray:
@@ -90,11 +102,24 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     rates = interpolate_missing(log.stack(GYRO)) if log.has(*GYRO) else None
     pwm = interpolate_missing(log.stack(PWM))
     running = pwm.max(axis=1) > 0.0
-    usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
+    unmeasured = _long_holes(log) & ~lost
+    if (unmeasured & ~ground).any():
+        notes = (*notes, HOLE_NOTE.format((unmeasured & ~ground).sum() * PERIOD_S, LONGEST_BRIDGE_S))
+    touched = near_ground(ground, running) | knocks(force, ground & ~running) | jolts(force, rates, ~ground)
+    usable = ~lost & ~unmeasured & ~touched
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
-                  body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
-                  notes=notes, cannot=cannot)
+                  body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost,
+                  unmeasured=unmeasured, touching=touching, notes=notes, cannot=cannot)
+
+
+def _long_holes(log: FlightLog) -> np.ndarray:
+    """Samples (n,), bool, in a hole of more than LONGEST_BRIDGE_S of a column of the IMU or of the motor commands."""
+    missing = np.isnan(log.stack([c for c in (*ACC, *GYRO, *PWM) if log.has(c)])).T
+    out = np.zeros(len(log), bool)
+    for start, stop in (hole for column in missing for hole in runs(column)):
+        out[start:stop] |= stop - start > MOST_BRIDGED
+    return out
 
 
 def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
