@@ -7,7 +7,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.controls import arms_of, control_of
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
+from airtouch.gap.answer.notes import at_end_of_range, cannot_be_replayed, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, closure_of, gap_of
@@ -157,7 +157,8 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         result, where=cells, map=whole_map, headline=headline,
         arms=arms_of(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
-        cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        cannot=(*cannot_of([f.cannot for f in usable]), *cannot_be_replayed(selection)),
+        flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
