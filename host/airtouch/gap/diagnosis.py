@@ -25,7 +25,7 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
 from airtouch.gap.passing import overhead
-from airtouch.gap.result import Diagnosis
+from airtouch.gap.result import FITTED, HELD_OUT, Diagnosis
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -134,12 +134,13 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     verdict, before = verdict_of(data, selection, gap), gap.closure.before
     is_effect = verdict == "effect"
     effects = named_effects(data, selection) if is_effect else []
+    passes_alone = len(effects) == 1 and bool(effects[0].seconds)  # it may act in one half only: none is held out
     ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=() if verdict == "none" else alike_of(selection),
         where=(), gap={"before": before, "after": gap.closure.after if is_effect else before, "floor": 1.0},
-        shrink=gap.closure.shrink if is_effect else None,
+        shrink=gap.closure.shrink if is_effect else None, judged_on=FITTED if passes_alone else HELD_OUT,
         control=control_of(data, selection, gap) if is_effect else None)
 
 

@@ -28,7 +28,7 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
+from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.vehicle import Vehicle
@@ -78,7 +78,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     answer = Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
-        shrink=closures[first].shrink if verdict == "effect" else None,
+        shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(probability_of, first, closures) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
@@ -92,7 +92,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
 def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
     """Gap before and after in standard deviations of the floor, and the fraction of it that closes, with its interval.
 
-    gap (4,): BALANCE from the nominal mean.
+    The hypothesis was fitted to this same gap: nothing is held out. gap (4,): BALANCE from the nominal mean.
     """
     spread = np.sqrt(base.variance[BALANCE])
 
