@@ -16,7 +16,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, notes_on, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -90,7 +90,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
-        return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
+        return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
+                                        pictures)
     say("calibration")
     calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
     if before is not None and before.calibrated is not None:
@@ -176,7 +177,7 @@ def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[s
 
 def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
-    notes = [note for f in comparison.usable for note in f.notes] + [*of_logs]
+    notes = [*notes_on(comparison.usable, comparison.nominal), *of_logs]
     notes += list(comparison.calibration.notes) if comparison.calibration else [NO_BASELINE]
     notes += differences(comparison.study, comparison.nominal)
     notes += flown_unlike(comparison.study, comparison.usable)

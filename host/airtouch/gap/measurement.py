@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
-from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import ready, ready_flights, with_gyro_if_any
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
@@ -122,7 +122,8 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
+    notes += [*notes_of([(m.parts[0].name, m.notes) for m in measured]),
+              *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,

@@ -10,7 +10,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.flights.attitude import attitude, in_world_axes, world_force
 from airtouch.gap.flights.clock import PERIOD_S, at_100_hz, with_lost_rows
 from airtouch.gap.flights.contact import jolts, knocks, near_ground, within
-from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, stamped_at_arrival, without_bad_columns
+from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, notes_of, stamped_at_arrival, without_bad_columns
 from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
@@ -156,6 +156,12 @@ def with_gyro_if_any(flights: Sequence[Flight], reasons: list[str]) -> list[Flig
         return list(flights)
     reasons += [f"{f.name}: no gyro, which the other flights have; left out" for f in flights if f.rates is None]
     return with_gyro
+
+
+def notes_on(flights: Sequence[Flight], nominal: Sequence[Flight]) -> list[str]:
+    """The notes on flights and on those of the baseline."""
+    return [*notes_of([(f.name, f.notes) for f in flights]),
+            *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
 
 
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
