@@ -19,7 +19,7 @@ from airtouch.gap.result import Quantity, rounded
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell, plain_cell
-from airtouch.gap.where.cell_words import in_words
+from airtouch.gap.where.cell_words import in_words, short
 from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
@@ -61,9 +61,11 @@ class Measurement:
         """Where most of the gap lies, and how large all of it is."""
         where = f"Most of the gap lies {in_words(self.headline)}." if self.headline else \
             "No gap stands out from the floor."
-        calibrated = f", {self.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights." \
+        if not np.isfinite(self.gap["before"]):
+            return where, "How large it is over all is not known: no cell of the map is in the air."
+        calibrated = f", {short(self.gap['calibrated'])} times with the vehicle calibrated on the baseline flights." \
             if "calibrated" in self.gap else "."
-        return where, f"Overall it is {self.gap['before']:.2g} times the floor{calibrated}"
+        return where, f"Overall it is {short(self.gap['before'])} times the floor{calibrated}"
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
