@@ -118,6 +118,15 @@ def test_a_slower_log_is_refused(log, with_clock):
     assert "logged at 50 Hz; the diagnosis needs 100 Hz or more" in reasons[0]
 
 
+@pytest.mark.parametrize("unknown", [0, 1, 3])
+def test_a_clock_that_runs_backwards_is_refused_though_times_are_missing_there(log, unknown):
+    time = np.where(np.arange(len(log)) < 900, log["t_s"], log["t_s"] - 3.0)
+    time[900:900 + unknown] = np.nan
+    reasons = []
+    assert not list(ready_flights([log.with_columns({"t_s": time})], VEHICLE, reasons))
+    assert f"sample {900 + unknown}: the clock runs backwards by 2.9" in reasons[0]
+
+
 def test_a_clock_that_counts_from_1970_is_a_clock(log):
     plain = without(log, 700, 701)
     unix = as_flight(FlightLog({**plain.columns, "t_s": plain["t_s"] + 1.8e9}, log.meta))
