@@ -12,6 +12,7 @@ from airtouch.gap.naming.unknown import (
 )
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
+from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.signatures.signature import RELATIONS_ONLY
 
 GAP_AT_FLOOR = "the gap as a whole is at its floor"
@@ -112,9 +113,9 @@ def _remainder_in_words(selection: Selection, name: str) -> str:
 
 
 def cell_in_words(cell: int) -> str:
-    """A cell of the spectra as `force_z at 0 to 0.6 Hz at rest`: channel, band, and whether on the ground."""
+    """A cell of the spectra as `lift at 0-0.6 Hz at rest`: channel, band, and whether on the ground."""
     view, channel, (low, high) = place_of(cell)
-    return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
+    return f"{CHANNEL_WORDS[channel]} at {low:g}-{high:g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:
