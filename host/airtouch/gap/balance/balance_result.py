@@ -38,8 +38,8 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
 LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
-NO_GYRO = ("no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
-           "leave both as they are were not tried")
+NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
+           "it is; candidates that leave both as they are were not tried")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 
 
