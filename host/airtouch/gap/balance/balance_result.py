@@ -34,8 +34,9 @@ from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
-#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen
-WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
+#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen, those that a
+#: hover shows (`signature.WRONG` has others)
+WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
 LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
@@ -117,8 +118,8 @@ def _gap(verdict: str, closure: Closure) -> OverallGap:
 
 
 def control_of(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
-    """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
-    wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
+    """The gap with a deliberately wrong effect; None where none of WRONG_IN_HOVER is surely wrong."""
+    wrong = next((n for n in WRONG_IN_HOVER if n != first and probability_of.get(n, 1.0) < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, closures[wrong])
 
 

@@ -75,6 +75,11 @@ def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:
     """Height over the floor (n,): the logged one, else the down range without its steps."""
     if log.has(POSITION[2]):
         return interpolate_missing(log[POSITION[2]])
+    return height[0] + climbed(height, STEP_M)
+
+
+def climbed(height: np.ndarray, step_m: float) -> np.ndarray:
+    """Height (n,), m, gained since the first sample by a down range without its steps, changes of more than step_m."""
     change = np.diff(height, prepend=height[0])
-    change[np.abs(change) > STEP_M] = 0.0
-    return height[0] + np.cumsum(change)
+    change[np.abs(change) > step_m] = 0.0
+    return np.cumsum(change)
