@@ -75,6 +75,27 @@ def test_rows_that_come_late_by_turns_are_jitter(log):
     assert flight.clock_s.std() == pytest.approx(1e-3, rel=0.05) and not flight.lost.any()
 
 
+def test_a_hole_of_seconds_in_what_is_measured_is_no_evidence_and_no_lost_row(log):
+    """A log of 200 Hz without 2 s of its rows, and one of 100 Hz without the gyro's values then."""
+    fast = at_rate(log, 200)
+    hole = FlightLog({k: np.delete(v, np.arange(1400, 1800)) for k, v in fast.columns.items()}, fast.meta)
+    silent = log.with_columns({"gyro_y_radps": np.where(np.abs(np.arange(len(log)) - 800) < 100, np.nan,
+                                                        log["gyro_y_radps"])})
+    for one in (hole, silent):
+        flight = as_flight(one)
+        assert not flight.usable[703:897].any() and flight.bridged[703:897].all() and not flight.lost.any()
+        assert flight.usable[500:690].all() and flight.usable[910:1000].all()
+        (note,) = flight.notes
+        assert "2.0 s in the air are no evidence" in note
+
+
+def test_a_channel_that_is_logged_ten_times_slower_stays_evidence(log):
+    i = np.arange(len(log))
+    slow = np.where((i > 400) & (i < 1200) & (i % 10 > 0), np.nan, log["gyro_y_radps"])
+    flight = as_flight(log.with_columns({"gyro_y_radps": slow}))
+    assert np.array_equal(flight.usable, as_flight(log).usable) and not flight.bridged.any() and not flight.notes
+
+
 def test_without_a_down_range_the_height_comes_from_the_position(log):
     """In a hover over the flat floor, 2 s before the platform: the simulated range is the truth, within its noise."""
     ranged = as_flight(log)
@@ -114,6 +135,15 @@ def test_a_slower_log_is_refused(log, with_clock):
         slow = FlightLog({k: v for k, v in slow.columns.items() if k != "t_s"}, {"sample_period_s": 0.02})
     assert not list(ready_flights([slow], VEHICLE, reasons))
     assert "logged at 50 Hz; the diagnosis needs 100 Hz or more" in reasons[0]
+
+
+@pytest.mark.parametrize("unknown", [0, 1, 3])
+def test_a_clock_that_runs_backwards_is_refused_though_times_are_missing_there(log, unknown):
+    time = np.where(np.arange(len(log)) < 900, log["t_s"], log["t_s"] - 3.0)
+    time[900:900 + unknown] = np.nan
+    reasons = []
+    assert not list(ready_flights([log.with_columns({"t_s": time})], VEHICLE, reasons))
+    assert f"sample {900 + unknown}: the clock runs backwards by 2.9" in reasons[0]
 
 
 def test_a_clock_that_counts_from_1970_is_a_clock(log):
