@@ -186,6 +186,21 @@ def test_dask_gives_every_flight_once_though_a_worker_dies(quick, tmp_path, vehi
     np.testing.assert_array_equal(table(sample), table(flight.fly(scene, vehicle, 0, 7)))
 
 
+def test_two_requests_on_one_scheduler_get_each_its_own_flights(vehicle):
+    distributed = pytest.importorskip("dask.distributed")
+    scene, wind = scenario.parse(QUICK, "quick"), {"wind": {"x": 0.2}}
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as local:
+        with distributed.Client(local) as one, distributed.Client(local) as two:
+            calm = cluster.flights(one, scene, range(3), vehicle=vehicle)
+            first = next(calm)  # its others wait at the scheduler
+            windy = list(cluster.flights(two, scene, range(3), vehicle=vehicle, effects=wind))
+            calm = [first, *calm]
+    for logs_of, effects in ((calm, ()), (windy, wind)):
+        for log in logs_of:
+            expected = flight.fly(scene, vehicle, 0, log.meta["flight"], effects=effects)
+            np.testing.assert_array_equal(table(log), table(expected))
+
+
 def test_failures_survive_a_line_cut_short(tmp_path):
     line = json.dumps({"flight": 3, "seed": 0, "reason": "x", "time_s": 1.0, "scenario": "s"})
     (tmp_path / store.FAILED).write_text(line + "\n" + line[:20])
