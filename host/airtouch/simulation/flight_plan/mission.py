@@ -137,7 +137,7 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
         length, width = number_list(step, "size_m", place, 2, above=0.0)
         corner = pen.at.copy()
         _check_duration(width / step["spacing_m"] / RATE_HZ, place)  # a row or more for each line
-        lines = int(width // step["spacing_m"]) + 1
+        lines = int(width / step["spacing_m"] + 1e-9) + 1  # a whole number of them but for rounding is that number
         _check_duration(lines * length / step["speed_mps"] + width / step["speed_mps"], place)
         for line in range(lines):
             y = corner[1] + line * step["spacing_m"]
