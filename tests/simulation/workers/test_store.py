@@ -53,7 +53,8 @@ def test_a_run_json_of_something_else_is_no_leave_to_remove(tmp_path):
     assert (tmp_path / "run.json").read_text() == "run.json"
 
 
-@pytest.mark.parametrize("text", ["file,use\nmine.csv,clean\n", store.HEAD + "\nmine.csv.gz,clean,0,,,,\n"])
+@pytest.mark.parametrize("text", ["file,use\nmine.csv,clean\n", store.HEAD + "\nmine.csv.gz,clean,0,,,,\n",
+                                  store.HEAD + "\n" + "x" * 200_000 + "\n"])
 def test_a_manifest_of_the_user_stays(tmp_path, text):
     (tmp_path / "manifest.csv").write_text(text)
     (tmp_path / "short.toml").write_text(SHORT)
@@ -102,6 +103,14 @@ def test_flights_of_which_no_version_is_known_are_not_continued(tmp_path):
     path.write_text(json.dumps({k: v for k, v in request.items() if k not in ("airtouch", "firmware_digest")}))
     assert "not known: airtouch, firmware_digest)" in run(tmp_path)
     assert list((tmp_path / "out").glob("*.csv.gz"))
+
+
+def test_a_name_with_a_comma_fills_and_continues_a_folder(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT.replace('"short"', "'a, \"b\"'"))
+    assert run(tmp_path) is None and run(tmp_path) is None
+    with open(tmp_path / "out" / "manifest.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["file"] for row in rows] == ['a, "b"_0_000000.csv.gz'] and rows[0]["wind"] == "none"
 
 
 def test_rows_of_the_manifest_that_the_user_edited_stay(tmp_path):

@@ -7,7 +7,9 @@ kill the same command flies only what is missing. Flights that diverged are list
 `diverged.jsonl` and have no file.
 """
 
+import csv
 import hashlib
+import io
 import json
 import os
 import re
@@ -82,9 +84,17 @@ def check_manifest(folder: Path) -> None:
     if not path.exists():
         return
     head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
-    if head != HEAD or not all(FLIGHT.fullmatch(row.split(",")[0]) for row in rows):
+    if head != HEAD or not all(FLIGHT.fullmatch(_file_of(row)) for row in rows):
         raise AirTouchError(f"{path}: not written by a simulation, and its flights need another; "
                             "choose another folder, or move it away")
+
+
+def _file_of(row: str) -> str:
+    """The first cell of a row of a manifest; "" where there is none."""
+    try:
+        return next(csv.reader([row]), [""])[0]
+    except csv.Error:
+        return ""
 
 
 def path_of(folder: Path, scenario: str, seed: int, flight: int) -> Path:
@@ -144,7 +154,7 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
     """
     check_manifest(folder)
     path = folder / MANIFEST
-    listed = {row.split(",")[0]: row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
+    listed = {_file_of(row): row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
     lines = [HEAD, *(row for name, row in listed.items() if (folder / name).exists())]
     for number, flight in _flights(folder, scenario.name, seed).items():
         if flight.name in listed:
@@ -153,7 +163,9 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
         height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
         cells = [flight.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
-        lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
+        text = io.StringIO()
+        csv.writer(text, lineterminator="").writerow([f"{c:.4g}" if isinstance(c, float) else c for c in cells])
+        lines.append(text.getvalue())
     temporary = folder / f".{MANIFEST}.{os.getpid()}"
     temporary.write_text("\n".join(lines) + "\n")
     temporary.replace(folder / MANIFEST)
