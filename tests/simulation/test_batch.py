@@ -54,6 +54,27 @@ def test_flights_do_not_depend_on_workers_or_batch():
     assert not np.array_equal(table(by_one[0])[-1], table(other_seed)[-1])
 
 
+@pytest.mark.parametrize(("wrong", "message"), [
+    ({"seed": -1}, "seed must be a whole number, 0 or more, not -1"),
+    ({"workers": 0}, "workers must be a whole number, 1"),
+    ({"count": -3}, "the number of flights must be"), ({"effects": {"nope": {}}}, "no effect 'nope'"),
+    ({"effects": {"wind": {"x": 1e9}}}, "wind: x"), ({"without": ["nope"]}, "no effect 'nope'")])
+def test_bad_input_is_refused_at_the_call(wrong, message):
+    with pytest.raises(AirTouchError) as error:
+        batch.flights(scenario.parse(QUICK, "quick"), **({"count": 1} | wrong))
+    assert message in str(error.value)
+
+
+def test_numbers_of_numpy_are_numbers():
+    scene = scenario.parse(QUICK, "quick")
+    two = batch.simulate(scene, seeds=np.int64(2), seed=np.int64(1), workers=np.int64(1))
+    assert [log.meta["flight"] for log in two] == [0, 1]
+    (second,) = batch.simulate(scene, seeds=np.array([1]), seed=1)
+    np.testing.assert_array_equal(table(second), table(two[1]))
+    with pytest.raises(AirTouchError, match="a flight's number must be"):
+        batch.simulate(scene, seeds=[-1])
+
+
 def test_the_generator_flies_only_a_little_ahead(monkeypatch):
     numbers = []
     real = batch.fly
