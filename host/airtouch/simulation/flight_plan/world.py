@@ -107,8 +107,10 @@ def _beyond(world, k, x, y, distance):
 def below(world, x, y, z, radius):
     """The surfaces under a disc of `radius` m at (x, y, z): lower, upper, cover.
 
-    lower: row of World.surface that lies under the whole disc; upper: row of the higher one under part of it;
-    cover: share of the disc over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing.
+    lower: row of World.surface under the disc; upper: row of the higher one under part of it; cover: share of the disc
+    over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing. Where several platforms each
+    reach under a part of the disc, lower and upper are the highest two of them, as if the lower one were under all of
+    the rest; what is between and beside them is left out.
     """
     n = len(world.first) - 1
     lower, upper, cover = n, n, 0.0
