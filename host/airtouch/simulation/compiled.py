@@ -36,7 +36,8 @@ def _nothing() -> None:
 def _cache_folder(source: Path) -> Path:
     """Where numba keeps the machine code of a source: beside it, in NUMBA_CACHE_DIR or in the user's cache."""
     inside = FunctionType(_nothing.__code__.replace(co_filename=str(source)), globals())
-    return Path(njit(cache=True)(inside).stats.cache_path)
+    cached: Any = njit(cache=True)(inside)
+    return Path(cached.stats.cache_path)
 
 
 def _drop_stale_machine_code() -> None:
