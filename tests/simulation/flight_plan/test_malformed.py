@@ -108,6 +108,11 @@ def test_the_refusal_names_the_key(path, node, key):
     assert key in (refusal(scenario.parse, tomli_w.dumps(put(WHOLE, path, node))) or "")
 
 
+@pytest.mark.parametrize("name", ["", "/", "two\nlines", "nul\0"])
+def test_a_name_that_no_file_can_have_is_refused(name):
+    assert "name = " in (refusal(scenario.parse, tomli_w.dumps(WHOLE | {"name": name})) or "")
+
+
 @pytest.mark.parametrize("key, value", [("arm_m", -0.03), ("motor_time_constant_s", 0), ("mass_kg", "text")])
 def test_a_vehicle_that_cannot_be_is_refused(key, value):
     assert key in (refusal(vehicles.parse, tomli_w.dumps(CRAFT | {key: value})) or "")
