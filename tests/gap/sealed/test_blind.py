@@ -19,6 +19,7 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
+from airtouch.gap.sealed import answers as blind_answers
 from airtouch.gap.sealed import intervals
 from airtouch.gap.sealed import key as blind_key
 from airtouch.gap.sealed import make as blind
@@ -200,8 +201,7 @@ def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_chec
     rescored = blind_score.score(folder, folder / "answers")  # the same answers may be scored once more
     assert rescored["top_1"]["n"] == 4
     other = tmp_path / "other.json"
-    other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
-                                            "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))
+    other.write_text(json.dumps({"cases": [answer(f"flight_{i:04d}", "none", [("none", 1.0)]) for i in range(10)]}))
     with pytest.raises(AirTouchError, match="opened for other answers"):
         blind_score.score(folder, other)
     edited_key = tmp_path / "key.json"
@@ -324,10 +324,35 @@ def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():
 def test_answers_that_are_none(tmp_path):
     (tmp_path / "x.json").write_text("{}")
     with pytest.raises(AirTouchError, match="without `flights`"):
-        blind_score.read_answers(tmp_path)
+        blind_answers.read_answers(tmp_path)
     (tmp_path / "x.json").write_text("no")
     with pytest.raises(AirTouchError, match="not the JSON"):
-        blind_score.read_answers(tmp_path)
+        blind_answers.read_answers(tmp_path)
+
+
+@pytest.mark.parametrize(("spoil", "says"), [
+    (lambda cases: [answer("other_0003", "none", [("none", 0.9)]), *cases], "other_0003: diagnosed, but not a flight"),
+    (lambda cases: cases[:1], "flight_0001: not diagnosed .1 of 2 flights"),
+    (lambda cases: [*cases, cases[0]], "flight_0000: diagnosed 2 times"),
+    (lambda cases: [cases[0], {k: v for k, v in cases[1].items() if k != "verdict"}], "flight_0001: .* without all of"),
+    (lambda cases: [cases[0], {k: v for k, v in cases[1].items() if k != "gap"}], "flight_0001: .* without all of"),
+    (lambda cases: [cases[0], {**cases[1], "ranking": [{"name": "mass"}]}], "flight_0001: .* without all of")])
+def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says):
+    """The file of another set, or one that lacks a field, was the one that the key was opened for."""
+    folder, mass = tmp_path / "set", blind_key.DrawnEffect("mass", "mass", 0, {"fraction": 0.1})
+    folder.mkdir()
+    names = ("flight_0000", "flight_0001")
+    for name in names:
+        (folder / f"{name}.csv.gz").touch()
+    flights = {names[0]: blind_key.DrawnFlight(()), names[1]: blind_key.DrawnFlight((mass,))}
+    blind_key.seal(folder, blind_key.key_of(folder), blind_key.Key(flights), 0)
+    cases = [answer(names[0], "none", [("none", 1.0)]), answer(names[1], "effect", [("mass", 1.0)], [("mass", {})])]
+    wrong, right = tmp_path / "wrong.json", tmp_path / "right.json"
+    wrong.write_text(json.dumps({"cases": spoil(cases)}))
+    right.write_text(json.dumps({"cases": cases}))
+    with pytest.raises(AirTouchError, match=says):
+        blind_score.score(folder, wrong)
+    assert blind_score.score(folder, right)["top_1"]["hits"] == 1
 
 
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():

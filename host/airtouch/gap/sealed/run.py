@@ -15,6 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
+from airtouch.gap.sealed.answers import flights_in
 from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in, seed_of
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
@@ -63,7 +64,7 @@ def run(out: Path, flights: int | None = None, seed: int | None = None, *, worke
     if not (out / SEALED).exists():
         make.make(out, FLIGHTS if flights is None else flights, SEED if seed is None else seed, progress=progress)
     answers = out / ANSWERS
-    names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
+    names = flights_in(out)
     sealed = sealed_in(out)["flights"]
     for what, asked, there in (("flights", flights, sealed), ("seed", seed, seed_of(out))):
         if None not in (asked, there) and asked != there:

@@ -1,6 +1,5 @@
 """Scores of diagnoses against the opened key: every figure with its n and a 95 % interval."""
 
-import json
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.policy import FIRST_GAIN
+from airtouch.gap.sealed.answers import Answer, check_answers, flight_of, flights_in, read_answers
 from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import FACTORS, SEEN
@@ -18,7 +18,6 @@ from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
 
-Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
 #: goals of the figures, by their place in `figures` with "/" between keys; host/docs/gap-blind.md has them too
 GOALS = {
@@ -57,31 +56,13 @@ class Sheet:
 
 
 def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
-    """Open the key of a set and score the diagnoses in `answers`: `figures`."""
-    cases = read_answers(answers)
-    return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
+    """Open the key of a set and score the diagnoses in `answers`: `figures`.
 
-
-def read_answers(path: Path) -> list[Answer]:
-    """Diagnoses from a folder of JSON files, one each, or a file of many (`diagnose --each --json`).
-
-    Raises AirTouchError for what is none.
+    The key stays shut where `check_answers` refuses them.
     """
-    path = Path(path)
-    files = sorted(path.glob("*.json")) if path.is_dir() else [path]
-    out: list[Answer] = []
-    for file in files:
-        try:
-            table = json.loads(file.read_text(encoding="utf-8"))
-            out += table["cases"] if "cases" in table else [table]
-        except (OSError, ValueError, TypeError):
-            raise AirTouchError(f"{file}: not the JSON of a diagnosis; write it with `diagnose --json`") from None
-    if not out:
-        raise AirTouchError(f"{path}: no diagnosis in it (*.json)")
-    for case in out:
-        if not isinstance(case, dict) or not case.get("flights") or not case.get("ranking"):
-            raise AirTouchError(f"{path}: a diagnosis without `flights` or `ranking`")
-    return out
+    cases = read_answers(answers)
+    check_answers(cases, flights_in(folder))
+    return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
 
 
 def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
@@ -111,7 +92,7 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
 
 def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
     """The diagnoses beside the key; raises AirTouchError for one of a flight that is not in it."""
-    full_registry = {_name(c): c for c in cases if not c.get("without")}
+    full_registry = {flight_of(c): c for c in cases if not c.get("without")}
     extra = sorted(set(full_registry) - set(key.flights))
     if extra:
         raise AirTouchError(f"{extra[0]}: diagnosed, but not a flight of this set")
@@ -205,7 +186,7 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
     tell the effect from the names that it was given.
     """
     single, full_registry = sheet.single_effect, sheet.full_registry
-    out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
+    out = {flight_of(c): c for c in sheet.cases if c.get("without") and flight_of(c) in single}
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n].level == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
@@ -285,12 +266,6 @@ def _true_names(sheet: Sheet) -> dict[str, str]:
     """The right first answer to each flight that was diagnosed, but for pairs: its effect, or "none"."""
     return {n: f.effects[0].name if f.effects else "none" for n, f in sheet.key.flights.items()
             if n in sheet.full_registry and len(f.effects) < 2}
-
-
-def _name(case: Answer) -> str:
-    """Name of the flight of a diagnosis, without folder and endings."""
-    name = Path(case["flights"][0]).name
-    return name.split(".")[0]
 
 
 def _verdict(case: Answer | None) -> str:
