@@ -355,6 +355,16 @@ def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says)
     assert blind_score.score(folder, right)["top_1"]["hits"] == 1
 
 
+def test_a_diagnosis_of_several_flights_together_is_refused():
+    """It was scored as one of the first of them alone."""
+    flights = {n: blind_key.DrawnFlight(()) for n in "ab"}
+    together = {**answer("a", "none", [("none", 1.0)]), "flights": ["a", "b"]}
+    for score in (lambda: blind_score.figures(blind_key.Key(flights), [together]),
+                  lambda: blind_answers.check_answers([together], ["a", "b"])):
+        with pytest.raises(AirTouchError, match="2 flights.*--each"):
+            score()
+
+
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():
     """Two normal variables whose log ratios have means 2 x APART apart: the test has its false alarms and its power."""
     distance = np.sqrt(2.0 * blind_severity.APART)
