@@ -355,6 +355,15 @@ def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says)
     assert blind_score.score(folder, right)["top_1"]["hits"] == 1
 
 
+@pytest.mark.parametrize(("without", "counts"), [(["wind"], 0), (["mass"], 1), (["wind", "thrust_coefficient"], 1)])
+def test_unknown_is_right_only_where_the_true_effect_was_left_out(without, counts):
+    """A mass in a diagnosis without wind is a right name; mass and thrust_coefficient are one."""
+    mass = blind_key.DrawnFlight((blind_key.DrawnEffect("mass", "mass", 0, {"fraction": 0.1}),))
+    found = answer("a", "effect", [("mass", 1.0)], [("mass", {})], without)
+    out = blind_score.figures(blind_key.Key({"a": mass}), [found])["unknown"]
+    assert out.get("all", {}).get("wrong_name", {}).get("n", 0) == counts
+
+
 def test_a_diagnosis_of_several_flights_together_is_refused():
     """It was scored as one of the first of them alone."""
     flights = {n: blind_key.DrawnFlight(()) for n in "ab"}

@@ -181,12 +181,14 @@ def right_variant(sheet: Sheet) -> Figure:
 def unknown(sheet: Sheet) -> dict[str, Any]:
     """How often flights whose effect was taken out of the registry are called `unknown`, and how likely that is.
 
+    Diagnoses without other effects, in which the true one could be named, do not count.
     said_unknown, wrong_name: share of them with that answer; auroc: of the probability of `unknown`, against the same
     flights with the effect in the registry. wrong_name_told_apart, auroc_told_apart: among those flights whose data
     tell the effect from the names that it was given.
     """
     single, full_registry = sheet.single_effect, sheet.full_registry
-    out = {flight_of(c): c for c in sheet.cases if c.get("without") and flight_of(c) in single}
+    out = {n: c for c in sheet.cases if (n := flight_of(c)) in single
+           and any(interchangeable(single[n].name, name) for name in c.get("without") or ())}
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n].level == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
