@@ -7,6 +7,7 @@ import re
 import select
 import signal
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -141,6 +142,28 @@ def test_processes_that_die_again_and_again_are_told(blind_check, tmp_path, monk
     with pytest.raises(AirTouchError, match="4 processes died"):
         blind_run.answer(blind_check[0], tmp_path / "answers", [("flight_0000", ()), ("flight_0001", ())], 2,
                          study=object())
+
+
+@pytest.mark.parametrize("deaths", [3, 4])
+def test_what_the_last_pass_answers_counts(tmp_path, monkeypatch, deaths):
+    """Of the four passes the last may do all that is left."""
+    passes = []
+
+    def answers_of(_, tasks, *__):
+        passes.append(len(tasks))
+        if len(passes) <= deaths:
+            raise BrokenProcessPool
+        return iter([blind_run.Answer(t.flight, t.without, "{}") for t in tasks])
+
+    monkeypatch.setattr(blind_run, "_answers", answers_of)
+    cases = [("flight_0000", ()), ("flight_0001", ())]
+    if deaths == 4:
+        with pytest.raises(AirTouchError, match="4 processes died"):
+            blind_run.answer(tmp_path, tmp_path, cases, study=object())
+    else:
+        blind_run.answer(tmp_path, tmp_path, cases, study=object())
+        assert len(list(tmp_path.glob("*.json"))) == 2
+    assert passes == 4 * [2]
 
 
 def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path):

@@ -94,7 +94,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     answers.mkdir(parents=True, exist_ok=True)
     cases = list(cases)
     for left in range(DEATHS, -1, -1):
-        todo = [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
+        todo = _unanswered(answers, cases)
         if not todo:
             return
         study = study or study_in(folder)
@@ -105,7 +105,13 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
                 progress(name)
         except BrokenProcessPool:
             progress(f"a process died; {left} more may")
-    raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+    if _unanswered(answers, cases):
+        raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+
+
+def _unanswered(answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]]) -> list[tuple[str, tuple[str, ...]]]:
+    """The cases that have no file in the folder of the answers."""
+    return [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
 
 
 def _answers(study: Study, tasks: Sequence[Task], workers: int, mapper: Mapper | None) -> Iterator[Answer]:
