@@ -254,6 +254,8 @@ def test_wilson_and_auroc_in_closed_form():
     assert half["high"] == pytest.approx(1.0 - half["low"])
     assert intervals.wilson(0, 10)["low"] == pytest.approx(0.0, abs=1e-12)
     assert intervals.wilson(0, 10)["high"] == pytest.approx(z2 / (10 + z2))
+    pairs = intervals.share_in_groups(5 * [[True, True]] + 5 * [[False, False]])  # as sure as ten values, not twenty
+    assert (pairs["hits"], pairs["n"]) == (10, 20) and pairs["low"] == half["low"] and pairs["high"] == half["high"]
     assert intervals.auroc([2, 3], [1, 1]) == 1.0 and intervals.auroc([1], [1]) == 0.5
     assert intervals.auroc([0.0, 2.0], [1.0]) == 0.5
 
@@ -318,6 +320,9 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
     figures = blind_score.figures(key, cases)
     assert figures["top_1"]["hits"] == 5
     assert (figures["right_variant"]["hits"], figures["right_variant"]["n"]) == (2, 4)
+    error, coverage = (figures["parameters"][f"{which}_with_variant"] for which in ("error", "coverage"))
+    assert (coverage["hits"], coverage["n"]) == (2, 5)  # the mass, 0.1 answered 0.2, and motor b are within theirs
+    assert error["n"] == 5 and error["value"] == pytest.approx(1.0)  # 1, 0, 1, 5 (rate 1.2 answered 0.2), 1
     assert ("right rotor or loop, where the first answer is right", "4") in {
         (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
 

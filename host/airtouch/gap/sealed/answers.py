@@ -34,7 +34,10 @@ def read_answers(path: Path) -> list[Answer]:
 
 
 def flight_of(case: Answer) -> str:
-    """Name of the flight of a diagnosis, without folder and endings; raises AirTouchError for one of several flights."""
+    """Name of the flight of a diagnosis, without folder and endings.
+
+    Raises AirTouchError for a diagnosis of several flights.
+    """
     if len(case["flights"]) > 1:
         raise AirTouchError(f"one diagnosis of {len(case['flights'])} flights, {case['flights'][0]} and others; a "
                             "sealed set is scored by one of each flight (`diagnose --each`)")

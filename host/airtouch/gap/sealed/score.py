@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.sealed.answers import Answer, check_answers, flight_of, flights_in, read_answers
-from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
+from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share, share_in_groups
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import FACTORS, SEEN
 from airtouch.gap.sealed.variant import has_variants, same_variant
@@ -33,6 +33,7 @@ GOALS = {
     "parameters/coverage": "87 to 93 %",
 }
 ROUNDED = 1e-9  #: relative difference of two strengths that are the same
+WRONG_VARIANT = 1.0  #: relative error of parameters of a wrong rotor or loop, as that of an answer of no effect; chosen
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
 
@@ -224,25 +225,47 @@ def shrink(sheet: Sheet) -> dict[str, Any]:
 
 
 def parameters(sheet: Sheet) -> dict[str, Any]:
-    """Parameters of flights rightly named: relative error of each effect's vector, in natural steps; coverage."""
+    """Parameters of single effects that are first and named: relative error of each vector, coverage.
+
+    error, in natural steps, and coverage: whatever the rotor, without answers that free no parameter that was drawn.
+    error_with_variant, coverage_with_variant: of all, where a wrong rotor or loop counts as an error of WRONG_VARIANT
+    and as a miss. The n of a coverage counts parameters, by_effect's that of errors.
+    """
     errors, held = defaultdict(list), defaultdict(list)
+    errors_all, held_all = [], []
     for n, e in sheet.single_effect.items():
         effects = sheet.full_registry[n]["effects"] if sheet.is_first[n] else []
         named = next((f for f in effects if f["name"] == e.name), None)
         if named is None:
             continue
-        term = terms(e.name)[0]
         known = {k: q for k, q in named["parameters"].items() if "low" in q and k in e.values}
-        size = np.sqrt(sum(((e.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
-        if not known or size == 0.0:
-            continue
-        off = np.sqrt(sum(((q["value"] - e.values[k]) / term.step(k)) ** 2 for k, q in known.items()))
-        errors[e.kind].append(float(off / size))
-        held[e.kind] += [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()]
-    all_errors = np.array([x for v in errors.values() for x in v])
-    return {"error": median(all_errors), "coverage": share(x for v in held.values() for x in v),
-            "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share(held[k])}
+        within, error = [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()], _relative_error(e, known)
+        if error is not None:
+            errors[e.kind].append(error)
+            held[e.kind].append(within)
+        if not same_variant(e, named["parameters"]):
+            errors_all.append(WRONG_VARIANT)
+            held_all.append([False] * max(len(known), 1))
+        elif error is not None:
+            errors_all.append(error)
+            held_all.append(within)
+    return {"error": median(np.array([x for v in errors.values() for x in v])),
+            "coverage": share_in_groups([x for v in held.values() for x in v]),
+            "error_with_variant": median(np.array(errors_all)), "coverage_with_variant": share_in_groups(held_all),
+            "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share_in_groups(held[k])}
                           for k, v in sorted(errors.items())}}
+
+
+def _relative_error(effect: DrawnEffect, known: Mapping[str, Mapping[str, float]]) -> float | None:
+    """Distance of answered parameters from the drawn ones over their distance from neutral, in natural steps.
+
+    known: the answered ones, as JSON. None where none of them was drawn off neutral.
+    """
+    term = terms(effect.name)[0]
+    size = np.sqrt(sum(((effect.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
+    if size == 0.0:
+        return None
+    return float(np.sqrt(sum(((q["value"] - effect.values[k]) / term.step(k)) ** 2 for k, q in known.items())) / size)
 
 
 def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
