@@ -10,7 +10,7 @@ from dataclasses import replace
 from airtouch.gap.evidence.clock import unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
-from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnName
+from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnNames
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
@@ -51,8 +51,9 @@ def with_names_withdrawn(data: Data, selection: Selection, shrink: float) -> Sel
     no fault of the logged times is explained.
     """
     over_none = selection.nameless.over_none
+    names = tuple(s.name for s in selection.named_steps)
     return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, unexplained_clock_gain(data, ())),
-                   spectrum_is_assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, shrink))
+                   spectrum_is_assumed=False, withdrawn=WithdrawnNames(names, shrink))
 
 
 def is_one_passing_effect(selection: Selection) -> bool:
