@@ -80,6 +80,15 @@ def test_a_partner_without_a_path_is_refused():
         overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [blind])
 
 
+def test_a_partner_whose_clock_goes_back_is_refused():
+    """Two recordings in one file, 5 m away in the first, overhead in the second."""
+    time = np.tile(np.arange(0.0, 10.0, 0.01), 2)
+    twice = FlightLog({"t_s": time, "x_m": np.repeat([5.0, 0.0], 1000), "y_m": 0.0 * time, "z_m": 0.9 + 0.0 * time},
+                      {"source": "twice.csv"})
+    with pytest.raises(AirTouchError, match="twice.csv: its clock t_s goes back after 9.99 s"):
+        overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [twice])
+
+
 @pytest.fixture(scope="module")
 def nominal_flight():
     return fly(1, 62)[0]

@@ -79,14 +79,18 @@ def path_at(time: np.ndarray, log: FlightLog) -> np.ndarray:
     """Position (n, 3), m, at times (n,) of the log's clock, s; NaN outside of the log and in its holes.
 
     A hole is longer than HOLE_S and than HOLE_PERIODS of the log's own: a straight line across it would make up a path.
+    Raises AirTouchError where the log's clock goes back.
     """
     place = log.stack(POSITION)
     known = np.isfinite(log["t_s"]) & np.isfinite(place).all(axis=1)
     at, place = log["t_s"][known], place[known]
     if len(at) < 2:
         return np.full((len(time), 3), np.nan)
-    out = np.column_stack([np.interp(time, at, values, np.nan, np.nan) for values in place.T])
     steps = np.diff(at)
+    if steps.min() < 0.0:
+        raise AirTouchError(f"{log.source}: its clock t_s goes back after {at[np.argmax(steps < 0.0)]:g} s; a path "
+                            "needs times that rise: cut the log there")
+    out = np.column_stack([np.interp(time, at, values, np.nan, np.nan) for values in place.T])
     step = steps[np.clip(np.searchsorted(at, time, "right") - 1, 0, len(steps) - 1)]
     out[step > max(HOLE_S, HOLE_PERIODS * float(np.median(steps)))] = np.nan
     return out
