@@ -168,7 +168,7 @@ def test_what_the_last_pass_answers_counts(tmp_path, monkeypatch, deaths):
 
 def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path):
     folder, _, study = blind_check
-    key = json.loads(blind_key.key_of(folder).read_text())["answers"]
+    key = json.loads(blind_key.key_path(folder).read_text())["answers"]
     name = next(n for n in sorted(key) if len(key[n]["effects"]) == 1)  # two take longer
     jobs = []
 
@@ -220,7 +220,7 @@ def test_flights_say_nothing_of_their_effect(blind_check):
 
 def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_check, tmp_path):
     folder, *_ = blind_check
-    key = blind_key.key_of(folder)
+    key = blind_key.key_path(folder)
     rescored = blind_score.score(folder, folder / "answers")  # the same answers may be scored once more
     assert rescored["top_1"]["n"] == 4
     other = tmp_path / "other.json"
@@ -373,7 +373,7 @@ def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says)
     for name in names:
         (folder / f"{name}.csv.gz").touch()
     flights = {names[0]: blind_key.DrawnFlight(()), names[1]: blind_key.DrawnFlight((mass,))}
-    blind_key.seal(folder, blind_key.key_of(folder), blind_key.Key(flights), 0)
+    blind_key.seal(folder, blind_key.key_path(folder), blind_key.Key(flights), 0)
     cases = [answer(names[0], "none", [("none", 1.0)]), answer(names[1], "effect", [("mass", 1.0)], [("mass", {})])]
     wrong, right = tmp_path / "wrong.json", tmp_path / "right.json"
     wrong.write_text(json.dumps({"cases": spoil(cases)}))

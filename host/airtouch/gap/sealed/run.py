@@ -134,7 +134,7 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
 
 def study_in(folder: Path) -> Study:
     """The study that a sealed set's own vehicle and nominal flights give."""
-    return make.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+    return make.calibrated_study(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
 
 
 def _begin(study: Study | None) -> None:
