@@ -16,7 +16,7 @@ from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.result import Diagnosis
-from airtouch.gap.sealed.make import SCENARIO, VEHICLE, stripped, study_of
+from airtouch.gap.sealed.make import SCENARIO, VEHICLE, calibrated_study, stripped
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 
@@ -45,8 +45,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.parse_args()
     vehicle = vehicles.load(VEHICLE)
-    study = study_of(vehicle, [stripped(log) for log in batch.flights(SCENARIO, NOMINAL, seed=NOMINAL_SEED, workers=1)
-                               if isinstance(log, FlightLog)])
+    logs = batch.flights(SCENARIO, NOMINAL, seed=NOMINAL_SEED, workers=1)
+    study = calibrated_study(vehicle, [stripped(log) for log in logs if isinstance(log, FlightLog)])
     errors = []
     for seed, (name, values, parameter) in enumerate(CASES, FIRST_SEED):
         (log,) = batch.flights(SCENARIO, 1, effects=[(name, values)], seed=seed, workers=1)

@@ -49,7 +49,9 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
                   (f"{name}: the same where the data tell the two apart", f"{place}/wrong_name_told_apart")]
     return [*shown, ("shrink with the right effect", "shrink/right"), ("shrink with a wrong effect", "shrink/wrong"),
             ("parameters: median relative error", "parameters/error"),
-            ("parameters: in the 90 % interval", "parameters/coverage")]
+            ("the same, a wrong rotor or loop as 100 %", "parameters/error_with_variant"),
+            ("parameters: in the 90 % interval", "parameters/coverage"),
+            ("the same, a wrong rotor or loop as outside", "parameters/coverage_with_variant")]
 
 
 def _figure_at(score: Mapping[str, Any], place: str) -> Mapping[str, Any]:

@@ -16,7 +16,7 @@ from airtouch.gap.naming.records import (
     Selection,
     Step,
     UnsteadinessRarity,
-    WithdrawnName,
+    WithdrawnNames,
 )
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.inference import LEAST_EVIDENCE
@@ -105,8 +105,12 @@ def test_reasons_where_nothing_is_named():
     assert not is_explained(nothing)
     assert why_not(nothing, "none", "unknown") == "a model without names gains 40 nats, but only up to 18 may be left"
     assert shortfall(nothing, judged("mass", 90.0)) == "gains 90 nats, while a model without names gains 150"
-    back = replace(nothing, withdrawn=WithdrawnName("mass", -0.2))
+    back = replace(nothing, withdrawn=WithdrawnNames(("mass",), -0.2))
     assert shortfall(back, judged("mass", 990.0)) == "closes 0% of the gap, too little to be its cause"
+    both = replace(nothing, withdrawn=WithdrawnNames(("mass", "wind"), 0.02))
+    for name, other in (("mass", "wind"), ("wind", "mass")):
+        assert shortfall(both, judged(name, 990.0)) == (f"closes 2% of the gap together with {other}, too little to be "
+                                                        "its cause")
     related = selection((), inference=True, beside=40.0)
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")

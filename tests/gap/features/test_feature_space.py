@@ -23,6 +23,15 @@ def test_a_standard_is_the_median_and_the_middle_two_thirds():
     assert np.median(standard.deviation) == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.parametrize(("missing", "deviation"), [(0.4, 2.0), (0.6, 0.0)])
+def test_flights_that_lack_a_feature_make_it_no_surer(missing, deviation):
+    """Normal features of deviation 2. Missing ones counted as the median: the deviation was over a third too small."""
+    rng = np.random.default_rng(2)
+    features = 2.0 * rng.normal(size=(2000, len(declared_features())))
+    features[rng.random(features.shape) < missing] = np.nan
+    assert np.median(standard_of(features).deviation) == pytest.approx(deviation, rel=0.05)
+
+
 def test_no_feature_is_known_better_than_the_simulator_is():
     """Features that do not vary at all: coherences, logarithms and the clock have a least deviation, others none."""
     names = [f.name for f in declared_features()]

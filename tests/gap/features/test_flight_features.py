@@ -24,7 +24,7 @@ def test_coherence_of_a_signal_and_its_noisy_copy(flight):
     signals = signals_of(flight, VEHICLE)
     table = rng.normal(size=signals.table.shape)
     table[:, LIFT.start] = 2.0 * table[:, COMMAND.start] + rng.normal(size=len(table))
-    values = coherence.coherence(replace(signals, table=table))
+    values = coherence.coherence_features(replace(signals, table=table))
     coherences = dict(zip((f.name for f in coherence.declared_features()), values, strict=True))
     wide = [k for k, (a, b) in enumerate(zip(coherence.BANDS_HZ, coherence.BANDS_HZ[1:], strict=False)) if b - a > 3.0]
     real = np.mean([coherences[f"climb real command:lift {k}"] for k in wide])
@@ -44,7 +44,8 @@ def test_a_feature_has_the_name_of_the_signal_that_moves_it(flight, column, word
     table = signals.table.copy()
     table[:, COLUMNS.index(column)] += 1.0 + np.random.default_rng(1).normal(size=len(table))
     moved = replace(signals, table=table)
-    for module, values in ((moments, lambda s: moments.moments(s, VEHICLE)), (edge_steps, edge_steps.edge_steps)):
+    for module, values in ((moments, lambda s: moments.moment_features(s, VEHICLE)),
+                           (edge_steps, edge_steps.edge_step_features)):
         changed = {f.name for f, a, b in zip(module.declared_features(), values(signals), values(moved), strict=True)
                    if not (a == b or np.isnan([a, b]).all())}
         named = {f.name for f in module.declared_features() if any(w in f.name for w in words)}
@@ -97,4 +98,4 @@ def test_a_heading_that_passes_half_a_turn_is_no_jump(flight):
 def test_without_a_block_in_the_air_nothing_is_told(flight):
     signals = signals_of(flight, VEHICLE)
     nowhere = replace(signals.flight, usable=np.zeros(len(signals.flight), bool))
-    assert np.isnan(coherence.coherence(replace(signals, flight=nowhere))).all()
+    assert np.isnan(coherence.coherence_features(replace(signals, flight=nowhere))).all()

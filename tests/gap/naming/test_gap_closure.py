@@ -70,6 +70,19 @@ def test_effects_named_beside_one_of_the_loop():
     assert named_beside_the_loop(DATA, selection(no_loop, several[1:])) == []
 
 
+def test_effects_of_the_loop_together_must_close_as_much_as_one():
+    """A second delay beside the first let both keep their names though they closed next to nothing."""
+    names = ("actuator_delay", "motor_lag")
+    law = SimpleNamespace(changes_loop=lambda active: any(a.effect.name in names for a in active))
+    data = SimpleNamespace(study=SimpleNamespace(loop=law))
+    both = selection(SimpleNamespace(terms=tuple(terms(n)[0] for n in names)),
+                     [SimpleNamespace(name=n, passing_key=None) for n in names])
+    for gap in (1.0, OVER):
+        assert closes_too_little(data, both, gap, LEAST_CLOSED - 0.01)
+        assert not closes_too_little(data, both, gap, LEAST_CLOSED)
+    assert named_beside_the_loop(data, both) == []
+
+
 @pytest.fixture(scope="module")
 def delayed(study):
     """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
@@ -84,7 +97,7 @@ def test_a_withdrawn_error_of_the_times_is_left_to_the_nameless_model(study):
     selection = select(data, {"time_jitter": all_candidates()["time_jitter"]}, without=tuple(PASSING))
     assert [s.name for s in selection.named_steps] == ["time_jitter"] and selection.nameless.of_times == 0.0
     after = with_names_withdrawn(data, selection, 0.1)
-    assert not after.steps and after.withdrawn == ("time_jitter", 0.1)
+    assert not after.steps and after.withdrawn == (("time_jitter",), 0.1)
     assert after.nameless.of_times == pytest.approx(selection.steps[0].gain)
     assert after.nameless.over_last_step == after.nameless.over_none == selection.nameless.over_none
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airtouch.gap.nominal import kept_scatter as module
-from airtouch.gap.nominal.kept_scatter import MOST, VARIABLE, folder_of, kept_scatter, key_of, scatter_from
+from airtouch.gap.nominal.kept_scatter import MOST, VARIABLE, digest_of, folder_of, kept_scatter, scatter_from
 from airtouch.gap.signatures.scatter import Scatter
 from airtouch.simulation import effects
 from gap_flights import VEHICLE
@@ -55,8 +55,8 @@ def test_the_same_baseline_is_measured_once_and_equal_to_the_bit(flight, folder)
 
 def test_whatever_differs_gives_another_key(flight):
     """One sample of each array and of each column of the log, the log's origin, the vehicle, what is left out."""
-    same = key_of(VEHICLE, [flight], ())
-    assert same == key_of(VEHICLE, [replace(flight)], ())
+    same = digest_of(VEHICLE, [flight], ())
+    assert same == digest_of(VEHICLE, [replace(flight)], ())
     changed = []
     for name, array in vars(flight).items():
         if isinstance(array, np.ndarray) and array.size:
@@ -67,18 +67,18 @@ def test_whatever_differs_gives_another_key(flight):
     for name, column in flight.log.columns.items():
         changed.append(replace(flight, log=flight.log.with_columns({name: column + 1.0})))
     changed.append(replace(flight, log=replace(flight.log, meta={**flight.log.meta, "format": "usd"})))
-    keys = [key_of(VEHICLE, [f], ()) for f in changed]
-    keys += [key_of(replace(VEHICLE, mass_kg=0.0301), [flight], ()), key_of(VEHICLE, [flight], ("wind",)),
-             key_of(VEHICLE, [flight, flight], ()), key_of(VEHICLE, [], ())]
+    keys = [digest_of(VEHICLE, [f], ()) for f in changed]
+    keys += [digest_of(replace(VEHICLE, mass_kg=0.0301), [flight], ()), digest_of(VEHICLE, [flight], ("wind",)),
+             digest_of(VEHICLE, [flight, flight], ()), digest_of(VEHICLE, [], ())]
     assert len({same, *keys}) == len(keys) + 1
 
 
 def test_a_firmware_file_that_changes_gives_another_key(flight, tmp_path):
     own = replace(VEHICLE, firmware=str(tmp_path / "own.toml"))
     (tmp_path / "own.toml").write_text("one")
-    before = key_of(own, [flight], ())
+    before = digest_of(own, [flight], ())
     (tmp_path / "own.toml").write_text("other")
-    assert key_of(own, [flight], ()) != before
+    assert digest_of(own, [flight], ()) != before
 
 
 def test_beside_an_effect_of_the_users_own_nothing_is_kept(flight, folder):

@@ -54,6 +54,14 @@ def test_a_flight_that_is_shaken_alike_all_along_has_no_bursts(study, nominal_fl
     assert burst_gate(Data(study, [nominal_flight]), YAW_BURSTS) == ((), 0.0)
 
 
+def test_bursts_that_fill_what_counts_are_none(study, nominal_flight, monkeypatch):
+    """Two pieces in five are far stronger, to the end: no rest is left, but for the ground, take-off and landing."""
+    piece = np.arange(len(nominal_flight)) // round(FORCE_BURSTS.piece_s / PERIOD_S)
+    level = np.where(piece % 5 < 2, np.sqrt(30.0), 1.0)
+    with_residual(monkeypatch, level * np.random.default_rng(0).normal(size=len(piece)))
+    assert burst_gate(Data(study, [nominal_flight]), FORCE_BURSTS) == ((), 0.0)
+
+
 def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_flight, monkeypatch):
     """A long rest with hardly any torque does not make the whole flight a burst."""
     values = shaken(nominal_flight, 0.0, 0.0, 1.0)

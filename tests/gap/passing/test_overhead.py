@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.clock import at_100_hz, with_lost_rows
-from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, ready
 from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.passing import gates, overhead
@@ -79,6 +80,15 @@ def test_a_partner_without_a_path_is_refused():
         overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [blind])
 
 
+def test_a_partner_whose_clock_goes_back_is_refused():
+    """Two recordings in one file, 5 m away in the first, overhead in the second."""
+    time = np.tile(np.arange(0.0, 10.0, 0.01), 2)
+    twice = FlightLog({"t_s": time, "x_m": np.repeat([5.0, 0.0], 1000), "y_m": 0.0 * time, "z_m": 0.9 + 0.0 * time},
+                      {"source": "twice.csv"})
+    with pytest.raises(AirTouchError, match="twice.csv: its clock t_s goes back after 9.99 s"):
+        overhead.seconds_overhead(path(0.0, (0.0, 0.0, 0.5)), [twice])
+
+
 @pytest.fixture(scope="module")
 def nominal_flight():
     return fly(1, 62)[0]
@@ -88,8 +98,39 @@ def evidence(study, one):
     """Size of a wake in SECONDS beyond its limit, and its gain."""
     known = overhead.with_overhead(study, one, SECONDS)
     wake = gates.passing_effects(Data(known, [one]))[gates.KNOWN_OVERHEAD]
-    size = size_of(wake.gain / (len(one) * PERIOD_S), wake.strength)
+    size = size_of(wake.gain / ((one.phase != GROUND).sum() * PERIOD_S), wake.strength)
     return known.scatter.unusual({wake.key: size}), wake.gain
+
+
+def rested(flight, rows):
+    """A flight whose log begins with so many more rows on the ground, drawn from those before its take-off."""
+    rest = np.random.default_rng(0).choice(np.flatnonzero(~flight.on_ground)[0], rows)
+    columns = {k: np.concatenate([v[rest], v]) for k, v in flight.log.columns.items()}
+    columns["t_s"] = np.arange(rows + len(flight)) * PERIOD_S
+    return ready(FlightLog(columns, flight.log.meta), VEHICLE)
+
+
+def test_rest_before_a_flight_says_nothing_of_a_wake(study, nominal_flight):
+    """A flight that is shaken all along in the air, with and without half a minute on the ground before."""
+    shake = 2.0 * np.random.default_rng(0).normal(size=len(nominal_flight)) * ~nominal_flight.on_ground
+
+    def size(flight):
+        force, later_s = flight.acceleration.copy(), (len(flight) - len(shake)) * PERIOD_S
+        force[len(flight) - len(shake):, 2] += shake
+        seconds = tuple((a + later_s, b + later_s) for a, b in SECONDS)
+        known = overhead.with_overhead(study, replace(flight, acceleration=force), seconds)
+        return known.scatter.passing[gates.KNOWN_OVERHEAD][0]
+
+    assert size(rested(nominal_flight, 3000)) == pytest.approx(size(nominal_flight), rel=0.05)
+
+
+def test_known_seconds_are_shifted_around_the_time_in_the_air():
+    """Ten seconds of which two in the middle are on the ground: an interval is shifted by whole seconds, around."""
+    phase = np.where((np.arange(1000) >= 400) & (np.arange(1000) < 600), GROUND, GROUND + 1)
+    flight = SimpleNamespace(name="a", phase=phase)
+    shifted = overhead._shifted_gates(flight, ((1.5, 2.5),))
+    assert [[(round(a, 6), round(b, 6)) for _, a, b in gate] for gate in shifted] == [
+        [(2.5, 3.5)], [(3.5, 4.0), (6.0, 6.5)], [(6.5, 7.5)], [(7.5, 8.5)], [(8.5, 9.5)], [(9.5, 10.0)], [(0.5, 1.5)]]
 
 
 def test_a_short_push_in_told_seconds_is_beyond_nominal_and_none_is_not(study, nominal_flight):

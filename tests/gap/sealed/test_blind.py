@@ -7,6 +7,7 @@ import re
 import select
 import signal
 import time
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
+from airtouch.gap.sealed import answers as blind_answers
 from airtouch.gap.sealed import intervals
 from airtouch.gap.sealed import key as blind_key
 from airtouch.gap.sealed import make as blind
@@ -142,9 +144,31 @@ def test_processes_that_die_again_and_again_are_told(blind_check, tmp_path, monk
                          study=object())
 
 
+@pytest.mark.parametrize("deaths", [3, 4])
+def test_what_the_last_pass_answers_counts(tmp_path, monkeypatch, deaths):
+    """Of the four passes the last may do all that is left."""
+    passes = []
+
+    def answers_of(_, tasks, *__):
+        passes.append(len(tasks))
+        if len(passes) <= deaths:
+            raise BrokenProcessPool
+        return iter([blind_run.Answer(t.flight, t.without, "{}") for t in tasks])
+
+    monkeypatch.setattr(blind_run, "_answers", answers_of)
+    cases = [("flight_0000", ()), ("flight_0001", ())]
+    if deaths == 4:
+        with pytest.raises(AirTouchError, match="4 processes died"):
+            blind_run.answer(tmp_path, tmp_path, cases, study=object())
+    else:
+        blind_run.answer(tmp_path, tmp_path, cases, study=object())
+        assert len(list(tmp_path.glob("*.json"))) == 2
+    assert passes == 4 * [2]
+
+
 def test_answers_are_the_same_wherever_flights_are_spread(blind_check, tmp_path):
     folder, _, study = blind_check
-    key = json.loads(blind_key.key_of(folder).read_text())["answers"]
+    key = json.loads(blind_key.key_path(folder).read_text())["answers"]
     name = next(n for n in sorted(key) if len(key[n]["effects"]) == 1)  # two take longer
     jobs = []
 
@@ -196,12 +220,11 @@ def test_flights_say_nothing_of_their_effect(blind_check):
 
 def test_a_sealed_set_is_scored_for_one_set_of_answers_by_its_own_key(blind_check, tmp_path):
     folder, *_ = blind_check
-    key = blind_key.key_of(folder)
+    key = blind_key.key_path(folder)
     rescored = blind_score.score(folder, folder / "answers")  # the same answers may be scored once more
     assert rescored["top_1"]["n"] == 4
     other = tmp_path / "other.json"
-    other.write_text(json.dumps({"cases": [{"flights": ["flight_0000"], "verdict": "none",
-                                            "ranking": [{"name": "none", "probability": 1.0}], "effects": []}]}))
+    other.write_text(json.dumps({"cases": [answer(f"flight_{i:04d}", "none", [("none", 1.0)]) for i in range(10)]}))
     with pytest.raises(AirTouchError, match="opened for other answers"):
         blind_score.score(folder, other)
     edited_key = tmp_path / "key.json"
@@ -231,6 +254,8 @@ def test_wilson_and_auroc_in_closed_form():
     assert half["high"] == pytest.approx(1.0 - half["low"])
     assert intervals.wilson(0, 10)["low"] == pytest.approx(0.0, abs=1e-12)
     assert intervals.wilson(0, 10)["high"] == pytest.approx(z2 / (10 + z2))
+    pairs = intervals.share_in_groups(5 * [[True, True]] + 5 * [[False, False]])  # as sure as ten values, not twenty
+    assert (pairs["hits"], pairs["n"]) == (10, 20) and pairs["low"] == half["low"] and pairs["high"] == half["high"]
     assert intervals.auroc([2, 3], [1, 1]) == 1.0 and intervals.auroc([1], [1]) == 0.5
     assert intervals.auroc([0.0, 2.0], [1.0]) == 0.5
 
@@ -295,6 +320,9 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
     figures = blind_score.figures(key, cases)
     assert figures["top_1"]["hits"] == 5
     assert (figures["right_variant"]["hits"], figures["right_variant"]["n"]) == (2, 4)
+    error, coverage = (figures["parameters"][f"{which}_with_variant"] for which in ("error", "coverage"))
+    assert (coverage["hits"], coverage["n"]) == (2, 5)  # the mass, 0.1 answered 0.2, and motor b are within theirs
+    assert error["n"] == 5 and error["value"] == pytest.approx(1.0)  # 1, 0, 1, 5 (rate 1.2 answered 0.2), 1
     assert ("right rotor or loop, where the first answer is right", "4") in {
         (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
 
@@ -324,10 +352,54 @@ def test_a_wrong_name_counts_where_the_data_tell_it_from_the_effect():
 def test_answers_that_are_none(tmp_path):
     (tmp_path / "x.json").write_text("{}")
     with pytest.raises(AirTouchError, match="without `flights`"):
-        blind_score.read_answers(tmp_path)
+        blind_answers.read_answers(tmp_path)
     (tmp_path / "x.json").write_text("no")
     with pytest.raises(AirTouchError, match="not the JSON"):
-        blind_score.read_answers(tmp_path)
+        blind_answers.read_answers(tmp_path)
+
+
+@pytest.mark.parametrize(("spoil", "says"), [
+    (lambda cases: [answer("other_0003", "none", [("none", 0.9)]), *cases], "other_0003: diagnosed, but not a flight"),
+    (lambda cases: cases[:1], "flight_0001: not diagnosed .1 of 2 flights"),
+    (lambda cases: [*cases, cases[0]], "flight_0000: diagnosed 2 times"),
+    (lambda cases: [cases[0], {k: v for k, v in cases[1].items() if k != "verdict"}], "flight_0001: .* without all of"),
+    (lambda cases: [cases[0], {k: v for k, v in cases[1].items() if k != "gap"}], "flight_0001: .* without all of"),
+    (lambda cases: [cases[0], {**cases[1], "ranking": [{"name": "mass"}]}], "flight_0001: .* without all of")])
+def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says):
+    """The file of another set, or one that lacks a field, was the one that the key was opened for."""
+    folder, mass = tmp_path / "set", blind_key.DrawnEffect("mass", "mass", 0, {"fraction": 0.1})
+    folder.mkdir()
+    names = ("flight_0000", "flight_0001")
+    for name in names:
+        (folder / f"{name}.csv.gz").touch()
+    flights = {names[0]: blind_key.DrawnFlight(()), names[1]: blind_key.DrawnFlight((mass,))}
+    blind_key.seal(folder, blind_key.key_path(folder), blind_key.Key(flights), 0)
+    cases = [answer(names[0], "none", [("none", 1.0)]), answer(names[1], "effect", [("mass", 1.0)], [("mass", {})])]
+    wrong, right = tmp_path / "wrong.json", tmp_path / "right.json"
+    wrong.write_text(json.dumps({"cases": spoil(cases)}))
+    right.write_text(json.dumps({"cases": cases}))
+    with pytest.raises(AirTouchError, match=says):
+        blind_score.score(folder, wrong)
+    assert blind_score.score(folder, right)["top_1"]["hits"] == 1
+
+
+@pytest.mark.parametrize(("without", "counts"), [(["wind"], 0), (["mass"], 1), (["wind", "thrust_coefficient"], 1)])
+def test_unknown_is_right_only_where_the_true_effect_was_left_out(without, counts):
+    """A mass in a diagnosis without wind is a right name; mass and thrust_coefficient are one."""
+    mass = blind_key.DrawnFlight((blind_key.DrawnEffect("mass", "mass", 0, {"fraction": 0.1}),))
+    found = answer("a", "effect", [("mass", 1.0)], [("mass", {})], without)
+    out = blind_score.figures(blind_key.Key({"a": mass}), [found])["unknown"]
+    assert out.get("all", {}).get("wrong_name", {}).get("n", 0) == counts
+
+
+def test_a_diagnosis_of_several_flights_together_is_refused():
+    """It was scored as one of the first of them alone."""
+    flights = {n: blind_key.DrawnFlight(()) for n in "ab"}
+    together = {**answer("a", "none", [("none", 1.0)]), "flights": ["a", "b"]}
+    for score in (lambda: blind_score.figures(blind_key.Key(flights), [together]),
+                  lambda: blind_answers.check_answers([together], ["a", "b"])):
+        with pytest.raises(AirTouchError, match="2 flights.*--each"):
+            score()
 
 
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():

@@ -20,7 +20,7 @@ def sealed_set(folder, flights=2, seed=5):
     for name in (*(f"cal_{i}" for i in range(blind.CAL)), *(f"flight_{i:04d}" for i in range(flights))):
         (folder / f"{name}.csv.gz").touch()
     drawn = {f"flight_{i:04d}": blind_key.DrawnFlight(()) for i in range(flights)}
-    blind_key.seal(folder, blind_key.key_of(folder), blind_key.Key(drawn, {}, {"salt": "x", "seed": seed}), blind.CAL)
+    blind_key.seal(folder, blind_key.key_path(folder), blind_key.Key(drawn, {}, {"salt": "x", "seed": seed}), blind.CAL)
     return folder
 
 
@@ -29,7 +29,7 @@ def test_a_set_whose_replacement_is_broken_off_has_no_seal_and_no_key(tmp_path, 
     monkeypatch.setattr(blind, "nominal", broken_off)
     with pytest.raises(KeyboardInterrupt):
         blind.make(folder, 3, force=True)
-    assert not (folder / "sealed.json").exists() and not blind_key.key_of(folder).exists()
+    assert not (folder / "sealed.json").exists() and not blind_key.key_path(folder).exists()
 
 
 def test_answers_to_the_flights_of_an_older_set_go_with_it(tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
+from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.posterior import LEAST, standard_deviation
 from airtouch.gap.signatures.scatter import FALSE_SHARE, ApparentStrengths, Scatter, size_of, table
@@ -44,6 +45,16 @@ def test_flights_of_a_class_are_taken_for_it():
         distance = {other: np.median([np.abs(np.log(scatter.rms[k] / vehicle_class.rms[k])).mean() for k in rms])
                     for other, vehicle_class in table().items()}
         assert min(distance, key=distance.__getitem__) == name, distance
+
+
+def test_a_measure_that_no_baseline_flight_has_stays_that_of_the_class():
+    """Logarithms of entropies lie below 0: a flight of which nothing is known is no unsteady one."""
+    vehicle_class, vehicle = next((c, c.vehicle) for c in table().values() if c.vehicle and UNSTEADY_LIFT in c.passing)
+    still = {k: 0.0 * v for k, v in vehicle_class.rms.items()}
+    flights = [ApparentStrengths(still, still, 0.0, {"downwash": 0.1}) for _ in range(4)]
+    scatter = scatter_of(flights, True, vehicle)
+    assert vehicle_class.passing[UNSTEADY_LIFT][0] < 0.0
+    assert scatter.passing[UNSTEADY_LIFT] == pytest.approx(vehicle_class.passing[UNSTEADY_LIFT])
 
 
 def test_recorded_flights_are_never_taken_for_simulated_ones():

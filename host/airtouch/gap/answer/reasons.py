@@ -61,8 +61,11 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     if hypothesis.evidence < least:
         return (f"as strong as it often seems to be in nominal flights: of {hypothesis.gain:.0f} nats "
                 f"{max(hypothesis.evidence, 0.0):.1f} are beyond that scatter, but {least:.0f} are needed")
-    if hypothesis.name == selection.withdrawn.name:
-        return f"closes {max(selection.withdrawn.shrink, 0.0):.0%} of the gap, too little to be its cause"
+    withdrawn, shrink = selection.withdrawn
+    if hypothesis.name in withdrawn:
+        others = [name for name in withdrawn if name != hypothesis.name]
+        beside = f" together with {joined(others)}" if others else ""
+        return f"closes {max(shrink, 0.0):.0%} of the gap{beside}, too little to be its cause"
     if selection.named_hypothesis:
         names = [s.name for s in selection.named_steps]
         return (f"gains {hypothesis.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE, ReplayedFlight, angular_acceleration
 from airtouch.gap.signals.lost_rows import bridged_residual, bridging_power
 from airtouch.gap.signals.response import FIRST_BIN, Response, TorqueSpectra
@@ -53,6 +53,11 @@ class Data:
     def seconds(self) -> float:
         """How long the flights last together, s."""
         return sum(len(f) for f in self.flights) * PERIOD_S
+
+    @property
+    def air_seconds(self) -> float:
+        """How long the flights are in the air together, s."""
+        return sum(int(np.count_nonzero(f.phase != GROUND)) for f in self.flights) * PERIOD_S
 
     @cached_property
     def block_starts(self) -> list[BlockStarts]:

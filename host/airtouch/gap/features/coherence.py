@@ -40,7 +40,7 @@ GROUPS: dict[str, dict[str, int]] = {
 
 @cache
 def declared_features() -> tuple[Feature, ...]:
-    """What `coherence` gives: group, what of it (power, real, imaginary, alone), signals, number of the band."""
+    """What `coherence_features` gives: group, what of it (power, real, imaginary, alone), signals, number of band."""
     out: list[Feature] = []
     for group, signals in GROUPS.items():
         bands = range(len(BANDS_HZ) - 1)
@@ -51,7 +51,7 @@ def declared_features() -> tuple[Feature, ...]:
     return tuple(out)
 
 
-def coherence(signals: FlightSignals) -> np.ndarray:
+def coherence_features(signals: FlightSignals) -> np.ndarray:
     """Powers and coherences (len(declared_features()),) of a flight in the air; NaN for one without a block.
 
     Of each group: the logarithm of every signal's power in each band, the complex coherence of every two, and the

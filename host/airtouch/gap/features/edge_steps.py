@@ -46,12 +46,12 @@ VELOCITY = [s.name for s in SIGNALS].index("velocity x")  #: by its sign the fli
 
 @cache
 def declared_features() -> tuple[Feature, ...]:
-    """What `edge_steps` gives: kind of edge, signal, number of the mean in BINS; step of the down range."""
+    """What `edge_step_features` gives: kind of edge, signal, number of the mean in BINS; step of the down range."""
     return tuple(Feature(f"{kind} {what}") for kind in KINDS
                  for what in (*(f"{s.name} {k}" for s in SIGNALS for k in range(len(BINS))), "step"))
 
 
-def edge_steps(signals: FlightSignals) -> np.ndarray:
+def edge_step_features(signals: FlightSignals) -> np.ndarray:
     """Steps (len(declared_features()),) of a flight's signals at its edges, the mean over entries and over exits.
 
     Means of each signal in BINS after an edge less that before it, and the step of the down range, m; NaN where the

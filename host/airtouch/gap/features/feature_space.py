@@ -13,6 +13,7 @@ LONG_SHIFT = 8.0  #: length of a whitened shift above which longer ones count no
 SMALLEST_SINGULAR = 1e-6  #: of the largest, of a direction that is one
 VARIANCE_DOUBT = 0.1  #: share of a feature's variance that no nominal flight shows: see `cholesky_factor`
 SMALLEST = 1e-9  #: standard deviation of a feature that varies at all
+MOST_MISSING = 0.5  #: share of nominal flights that may lack a feature; a larger number relies on fewer flights
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,15 @@ class Standard:
 
 
 def standard_of(nominal: np.ndarray) -> Standard:
-    """The standard of nominal flights' features (n, features): the middle two thirds give the standard deviation."""
+    """The standard of nominal flights' features (n, features): the middle two thirds give the standard deviation.
+
+    Both are of the flights that have a feature, NaN where missing; one that more than MOST_MISSING lack says nothing.
+    """
     middle = np.nanmedian(nominal, axis=0)
-    low, high = np.quantile(np.where(np.isnan(nominal), middle, nominal), MIDDLE_TWO_THIRDS, axis=0)
+    low, high = np.nanquantile(nominal, MIDDLE_TWO_THIRDS, axis=0)
     deviation = np.hypot(0.5 * (high - low), [f.least for f in flight_features.declared_features()])
-    return Standard(middle, np.where(deviation > SMALLEST, deviation, 0.0))
+    known = (deviation > SMALLEST) & (np.isnan(nominal).mean(axis=0) <= MOST_MISSING)
+    return Standard(middle, np.where(known, deviation, 0.0))
 
 
 def cholesky_factor(standard: np.ndarray, doubt: float = VARIANCE_DOUBT) -> np.ndarray:

@@ -31,5 +31,5 @@ def features(flight: Flight, vehicle: Vehicle) -> np.ndarray | None:
     if flight.rates is None or not readable(flight.log):
         return None
     signals = signals_of(without_columns(flight, vehicle, UNSEEN), vehicle)
-    return np.concatenate([coherence.coherence(signals), moments.moments(signals, vehicle),
-                           edge_steps.edge_steps(signals)])
+    return np.concatenate([coherence.coherence_features(signals), moments.moment_features(signals, vehicle),
+                           edge_steps.edge_step_features(signals)])

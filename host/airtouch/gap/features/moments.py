@@ -31,7 +31,7 @@ LEAST_SCORE = 1e-9  #: sum of squares of a column that is added to it, so that n
 
 @cache
 def declared_features() -> tuple[Feature, ...]:
-    """What `moments` gives, in its order: scores, each phase, the second half, at rest, the clock."""
+    """What `moment_features` gives, in its order: scores, each phase, the second half, at rest, the clock."""
     means = [*COLUMNS[OF_MEANS], *COLUMNS[COMMAND]]
     slow = [*(f"{what} {axis}" for what in ("angle", "velocity", "rate") for axis in AXES), *COLUMNS[RANGE_RESIDUAL]]
     of_phase = [*(Feature(f"mean {what}") for what in (*means, *slow)),
@@ -47,7 +47,7 @@ def declared_features() -> tuple[Feature, ...]:
         Feature("clock lost", LEAST_LOST), Feature("clock runs", LEAST_LOST))
 
 
-def moments(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
+def moment_features(signals: FlightSignals, vehicle: Vehicle) -> np.ndarray:
     """Scores, means and variances (len(declared_features()),) of a flight; NaN where there is nothing to tell by.
 
     What force, torque and estimated speed have of the flight's own signals (`nameless.basis`); means and logarithms of

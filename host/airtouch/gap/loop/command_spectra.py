@@ -38,7 +38,7 @@ COMMAND_FREEDOM = 20.0  #: degrees of freedom of the Student-like tails of a blo
 STEPPED_COMMAND = 5.0
 FEWEST_TO_COMPARE = 3  #: blocks of a flight of which one can be unlike the others
 VANISHING_POWER = 1e-30  #: least power, in any unit, that is divided by or has a logarithm; far below any measured
-STEPS = 12  #: iterations to the power of highest likelihood; chosen
+ITERATIONS = 12  #: iterations to the power of highest likelihood; chosen
 
 
 def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
@@ -48,7 +48,7 @@ def block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndar
 
 def _block_spectra(flight: Flight, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
     """`block_spectra`, worked out."""
-    first = starts(flight)
+    first = steady_starts(flight)
     window, scale = hann_window(COMMAND_LENGTH)
     logged = commands(flight, vehicle)[:, :len(AXES)]
     cut = logged[first[:, None] + np.arange(COMMAND_LENGTH)] if len(first) else np.zeros((0, COMMAND_LENGTH, len(AXES)))
@@ -68,7 +68,7 @@ def highpassed(values: np.ndarray) -> np.ndarray:
     return values - both_ways(low, values, min(PADDING, len(values) - 2))
 
 
-def starts(flight: Flight) -> np.ndarray:
+def steady_starts(flight: Flight) -> np.ndarray:
     """First samples of the blocks, half overlapping."""
     return half_overlapping(count_within(~steady(flight), COMMAND_LENGTH) == 0, COMMAND_LENGTH)
 
@@ -99,7 +99,7 @@ def typical(power: np.ndarray) -> np.ndarray:
     Fixed point of the likelihood's slope. The mean would follow the few blocks in which a set-point stepped.
     """
     estimate = power.mean(axis=0)
-    for _ in range(STEPS):
+    for _ in range(ITERATIONS):
         estimate = estimate * counted_power(power / estimate).mean(axis=0)
     return estimate
 

@@ -39,8 +39,8 @@ FREE_GAINS = 1.5
 FLOOR_SMOOTH = 3.0  #: bins, standard deviation of the Gaussian that smooths the floor over the model's shape; chosen
 LEAST_STRENGTH = 1e-9  #: of a noise, over the whole, so that it can grow again
 LEAST_VELOCITY_GAIN = 1e-3  #: rad per m/s, of a velocity loop that is searched
-STEPS = 300  #: updates of noise strengths; chosen
-SEARCH_STEPS = 40  #: updates of noise strengths for each controller that a search tries; chosen
+UPDATES = 300  #: updates of noise strengths; chosen
+SEARCH_UPDATES = 40  #: updates of noise strengths for each controller that a search tries; chosen
 SEARCH_BLOCKS = 8.0  #: blocks that the misfit counts for against the prior of the gains in a search; chosen
 #: standard deviations of that prior, nepers around the firmware's gains: rate (climb), angle (height), velocity; chosen
 GAIN_SPREAD = (0.7, 0.4, 0.5)
@@ -88,27 +88,27 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
                                                                 mode="nearest")))
 
 
-def noise_strengths(controller: Controller, plant: AxisPlant, power: np.ndarray, steps: int = STEPS,
+def noise_strengths(controller: Controller, plant: AxisPlant, power: np.ndarray, updates: int = UPDATES,
                     ) -> AxisFit:
     """The noise strengths of highest likelihood for a command's power (bins,), N^2/Hz, under a controller."""
     shapes = through_window(noise_power(controller, plant, fine_frequencies()))
     scale = power.mean() / shapes.mean(axis=1)
     shapes = shapes * scale[:, None]
     strengths = np.full(len(shapes), 1.0 / len(shapes))
-    _update(strengths, np.ascontiguousarray(shapes), np.ascontiguousarray(power), steps)
+    _update(strengths, np.ascontiguousarray(shapes), np.ascontiguousarray(power), updates)
     over_model = power / (strengths @ shapes)
     return AxisFit(controller, strengths * scale, float((over_model - np.log(over_model) - 1.0).sum()))
 
 
 @njit(types.void(float64[::1], float64[:, ::1], float64[::1], int64), cache=True, error_model="numpy")
-def _update(strengths, shapes, power, steps):
+def _update(strengths, shapes, power, updates):
     """Multiplicative updates of strengths (sources,) that lower the Itakura-Saito divergence, in place.
 
     shapes (sources, bins): power for unit strengths; power (bins,): as measured.
     """
     sources, bins = shapes.shape
     over, square = np.empty(bins), np.empty(bins)
-    for _ in range(steps):
+    for _ in range(updates):
         for b in range(bins):
             model = 0.0
             for s in range(sources):
@@ -137,7 +137,7 @@ def _search(row: PlantRow, axis: str, power: np.ndarray) -> AxisFit:
 
     def cost(x: np.ndarray) -> float:
         """Minus the log posterior of gains x, nats."""
-        return SEARCH_BLOCKS * noise_strengths(controller(x), plant, power, SEARCH_STEPS).misfit + 0.5 * float(x @ x)
+        return SEARCH_BLOCKS * noise_strengths(controller(x), plant, power, SEARCH_UPDATES).misfit + 0.5 * float(x @ x)
 
     corners = [np.vstack([[g, *np.zeros(free - 1)], np.eye(free) + [g, *np.zeros(free - 1)]]) for g in FIRST_GAINS]
     best = min((minimize(cost, x[0], method="Nelder-Mead", options={"initial_simplex": x, **SIMPLEX})

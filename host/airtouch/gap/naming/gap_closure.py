@@ -10,7 +10,7 @@ from dataclasses import replace
 from airtouch.gap.evidence.clock import unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
-from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnName
+from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnNames
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
 from airtouch.gap.signatures.signature import CLOCK, MEAN
 from airtouch.gap.signatures.term import Term
@@ -19,16 +19,16 @@ from airtouch.gap.signatures.term import Term
 def least_shrink(data: Data, selection: Selection, gap: float) -> float | None:
     """Fraction of the gap that effects must close to be named; None where they need not close any.
 
-    gap: before they are in the model, in units of the floor. It holds for recorded flights. A single effect of the loop
-    must close LEAST_CLOSED, and so must a passing one if the gap is over STANDS_OUT. Over STANDS_OUT any
-    other must close more than 0: an effect that leaves the whole gap is not its cause. Effects of the logged times, and
-    one whose seconds are known from another vehicle's log, need close nothing.
+    gap: before they are in the model, in units of the floor. It holds for recorded flights. Effects of the loop, one or
+    several with no other beside them, must close LEAST_CLOSED, and so must a single passing one if the gap is over
+    STANDS_OUT. Over STANDS_OUT any other must close more than 0: an effect that leaves the whole gap is not its cause.
+    Effects of the logged times, and one whose seconds are known from another vehicle's log, need close nothing.
     """
     hypothesis = selection.named_hypothesis
     of_known_seconds = any(s.passing_key == KNOWN_OVERHEAD for s in selection.named_steps)
     if not selection.policy.must_close_gap or hypothesis is None or of_known_seconds:
         return None
-    if is_one_loop_effect(data, selection):
+    if is_of_the_loop_alone(data, selection):
         return LEAST_CLOSED
     if gap <= STANDS_OUT or any(t.shows_in == CLOCK for t in hypothesis.terms):
         return None
@@ -51,8 +51,9 @@ def with_names_withdrawn(data: Data, selection: Selection, shrink: float) -> Sel
     no fault of the logged times is explained.
     """
     over_none = selection.nameless.over_none
+    names = tuple(s.name for s in selection.named_steps)
     return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, unexplained_clock_gain(data, ())),
-                   spectrum_is_assumed=False, withdrawn=WithdrawnName(selection.named_steps[0].name, shrink))
+                   spectrum_is_assumed=False, withdrawn=WithdrawnNames(names, shrink))
 
 
 def is_one_passing_effect(selection: Selection) -> bool:
@@ -61,23 +62,30 @@ def is_one_passing_effect(selection: Selection) -> bool:
     return hypothesis is not None and len(selection.named_steps) == 1 and all(t.gate for t in hypothesis.terms)
 
 
-def is_one_loop_effect(data: Data, selection: Selection) -> bool:
-    """Whether one effect is named, and it is one of the control loop."""
-    hypothesis = selection.named_hypothesis
-    return hypothesis is not None and len(selection.named_steps) == 1 and _of_the_loop(data, hypothesis.terms)
+def is_of_the_loop_alone(data: Data, selection: Selection) -> bool:
+    """Whether effects are named, and all of them are of the control loop."""
+    hypothesis, names = selection.named_hypothesis, [s.name for s in selection.named_steps]
+    if hypothesis is None or len(names) == 1:
+        return hypothesis is not None and _of_the_loop(data, hypothesis.terms)
+    return not _not_of_the_loop(data, hypothesis.terms, names)
 
 
 def named_beside_the_loop(data: Data, selection: Selection) -> list[str]:
     """Effects that recorded flights name beside some of the control loop; empty where not both kinds are named.
 
-    Whether those of the loop stay beside them: `loop_closes_too_little`.
+    Whether those of the loop stay beside them: `loop_closes_too_little`. Where all are of the loop, `least_shrink`.
     """
     hypothesis = selection.named_hypothesis
     if not selection.policy.must_close_gap or hypothesis is None:
         return []
     names = [s.name for s in selection.named_steps]
-    others = [n for n in names if not _of_the_loop(data, [t for t in hypothesis.terms if t.name == n])]
+    others = _not_of_the_loop(data, hypothesis.terms, names)
     return others if len(others) < len(names) else []
+
+
+def _not_of_the_loop(data: Data, terms: Sequence[Term], names: Sequence[str]) -> list[str]:
+    """The effects, by name, of which no term that always acts changes the control loop."""
+    return [n for n in names if not _of_the_loop(data, [t for t in terms if t.name == n])]
 
 
 def loop_closes_too_little(shrink: float, shrink_of_others: float) -> bool:

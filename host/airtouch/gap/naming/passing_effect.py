@@ -66,9 +66,10 @@ def passing_evidence(data: Data, key: str, gain: float, strength: np.ndarray) ->
     key: `PassingEffect.key`; gain: nats; strength (k,): its scaled parameters.
     """
     assert data.study.scatter is not None  # no passing effect is looked for without nominal flights
-    sizes = {key: size_of(gain / data.seconds, strength)}
+    sizes = {key: size_of(gain / (data.air_seconds if key == KNOWN_OVERHEAD else data.seconds), strength)}
     if key == OVERHEAD:
-        of_wakes = {UNSTEADY_TORQUE: log_entropies(data)[UNSTEADY_TORQUE], DOWNWARD: downward(data)}
+        of_torque = {name: size for name, size in log_entropies(data).items() if name == UNSTEADY_TORQUE}
+        of_wakes = {**of_torque, DOWNWARD: downward(data)}
         sizes |= _of_known_scatter(data.study.scatter, of_wakes)
     return min(gain, PASSING_GAIN + data.study.scatter.unusual(sizes))
 

@@ -138,10 +138,10 @@ class UnsteadinessRarity(NamedTuple):
     rarest: str = ""
 
 
-class WithdrawnName(NamedTuple):
-    """An effect whose name was withdrawn, as its shrink of recorded flights' gap is too small; "" for none."""
+class WithdrawnNames(NamedTuple):
+    """Effects whose names were withdrawn, as their shrink of recorded flights' gap, together, is too small."""
 
-    name: str = ""
+    names: tuple[str, ...] = ()
     shrink: float = 0.0
 
 
@@ -154,7 +154,7 @@ class Selection:
     on; least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely
     than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
     as the effect is random or changes the loop of recorded flights; over_prediction: that of the effects named;
-    inference: what named the effects, where the relations of signals did; withdrawn: a name that was withdrawn;
+    inference: what named the effects, where the relations of signals did; withdrawn: names that were withdrawn;
     unsteadiness_rarity: how much less steady the flights are than nominal ones.
     """
 
@@ -167,7 +167,7 @@ class Selection:
     spectrum_is_assumed: bool
     over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
-    withdrawn: WithdrawnName = WithdrawnName()
+    withdrawn: WithdrawnNames = WithdrawnNames()
     unsteadiness_rarity: UnsteadinessRarity = UnsteadinessRarity()
 
     @property

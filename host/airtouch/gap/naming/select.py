@@ -1,8 +1,8 @@
 """Which effect: candidates are judged one against another and added one by one while held-out data ask for them.
 
-`none` is the hypothesis of no effect. `unknown` is the nameless model (gap.nameless.model): it needs more
-parameters, so a named effect that is right beats it; where it gains much on top of the named effects, something is left
-that they do not explain.
+`none` is the hypothesis of no effect. `unknown` is the answer where too much speaks against the effects named, on one
+of three grounds (`naming.unknown`). The first of them is the nameless model (`gap.nameless.model`): it needs more
+parameters, so a named effect that is right beats it, and what it gains beside the named effects they do not explain.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ PACKAGE_EFFECTS = frozenset(effects.NAMES)  #: names of the package's effects; o
 def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
            progress: Callable[[str], None] = lambda _: None, without: Sequence[str] = (), rank_all: bool = True,
            ) -> Selection:
-    """The selection of effects among candidates: every one is judged alone, then effects are named.
+    """The selection of effects among candidates: they are judged, then effects are named.
 
     1. Where no library of the signals' relations holds for the flights, the replay names the effects (`_by_replay`).
     2. Where one holds, its inference names them (`_by_relations`).
@@ -43,8 +43,9 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
        and leaves nothing unexplained: the effect's class was learned from few flights. Else as in 2.
 
     candidates: the variants of every effect by name; progress: called with the name of every candidate that is judged;
-    without: effects that are not searched for as passing ones; rank_all: judge every candidate alone where the
-    relations name the effects as well, which the ranking needs for the share of the gap that each closes.
+    without: effects that are not searched for as passing ones; rank_all: judge every candidate alone also where
+    the relations name the effects, as the ranking needs for the share of the gap that each closes; else only those that
+    are named are fitted there. The replay always judges every one alone.
     """
     search = Search(trial_of(data), candidates, progress)
     inference = inference_of(data, list(candidates))

@@ -84,16 +84,15 @@ def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
         return []
     trim = trims(flights, study.vehicle, study.calibration)
     limit = float(stdtrit(n - 2, 1.0 - 0.5 * FALSE_NOTES / trim.size))
-    words = [CHANNEL_WORDS[c.name] for c in CHANNELS[TRIM]]
     least = (FAR_SIMULATED if study.simulated else FAR) / limit
     notes = []
     for i, f in enumerate(flights):
         others = np.delete(trim, i, axis=0)
         error = others.std(axis=0, ddof=1) * np.sqrt(1.0 + 1.0 / (n - 1))  # of the difference to their mean
-        d = np.abs(trim[i] - others.mean(axis=0)) / np.maximum(error, least)
-        if d.max() > limit:
-            notes.append(f"{f.name}: declared nominal, yet its {words[int(np.argmax(d))]} is {d.max():.0f} standard "
-                         "deviations from the others'")
+        offset = trim[i] - others.mean(axis=0)
+        distance = np.abs(offset) / np.maximum(error, least)
+        if distance.max() > limit:
+            notes.append(f"{f.name}: declared nominal, yet far from the others' mean ({_farthest(offset, distance)})")
     return notes
 
 

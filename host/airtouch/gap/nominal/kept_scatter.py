@@ -42,7 +42,7 @@ def kept_scatter(vehicle: Vehicle, flights: Sequence[Flight], without: Sequence[
     folder = folder_of(os.environ)
     if folder is None or not set(all_candidates(without)) <= set(NAMES):
         return measure()
-    path = folder / f"scatter-{key_of(vehicle, flights, without)}.json"
+    path = folder / f"scatter-{digest_of(vehicle, flights, without)}.json"
     try:
         return scatter_from(path.read_bytes())
     except (OSError, ValueError):
@@ -93,7 +93,7 @@ def _pair(values: Any) -> tuple[float, float]:
     return float(one), float(other)
 
 
-def key_of(vehicle: Vehicle, flights: Sequence[Flight], without: Sequence[str]) -> str:
+def digest_of(vehicle: Vehicle, flights: Sequence[Flight], without: Sequence[str]) -> str:
     """A name that is another one where anything differs that the scatter of these flights depends on."""
     digest = hashlib.sha256(code_digest())
     firmware = Path(vehicle.firmware)  # a release's name, or a file of its own

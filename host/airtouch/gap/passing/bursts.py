@@ -50,19 +50,20 @@ LEAST_PIECES = 2 * LEAST_BLOCKS
 
 
 def burst_gate(data: Data, signal: BurstSignal) -> tuple[Gate, float]:
-    """The bursts of a signal in all flights, and nats that their choice costs; none where they fill the flights."""
+    """The bursts of a signal in all flights, and nats that their choice costs; none where they fill what counts."""
     gate: list[tuple[str, float, float]] = []
-    cost = 0.0
+    cost = judged_s = 0.0
     for flight in data.flights:
         gain = _gains(piece_powers(data.study, flight, signal.column, signal.band_hz, signal.piece_s), signal)
         known = int(np.isfinite(gain).sum())
+        judged_s += known * signal.piece_s
         if known < LEAST_PIECES:
             continue
         intervals = best_intervals(gain, np.zeros(len(gain), int), interval_cost(known))
         gate += [(flight.name, a * signal.piece_s, (b + 1) * signal.piece_s) for a, b in intervals]
         cost += interval_cost(known) * len(intervals)
     duration_s = sum(end - begin for _, begin, end in gate)
-    return ((), 0.0) if duration_s > MOST_OF_FLIGHTS * data.seconds else (tuple(gate), cost)
+    return ((), 0.0) if duration_s > MOST_OF_FLIGHTS * judged_s else (tuple(gate), cost)
 
 
 def residual_in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float],

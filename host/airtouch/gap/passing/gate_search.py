@@ -31,10 +31,11 @@ LEAST_BLOCKS = 6  #: blocks in the air, below which no gate is sought; a larger 
 #: s by which the ends of an interval are moved, in this order; the largest says how far they may go, the smallest how
 #: finely they are placed
 STEPS_S = (0.64, 0.32, 0.16, 0.08)
-#: fraction of the blocks in the air, and of all flights' seconds, above which an effect is no passing one; a larger
-#: number lets one pass that acts nearly all along
+#: fraction of the blocks in the air, and of the pieces that count (`bursts`), above which an effect is no passing one;
+#: a larger number lets one pass that acts nearly all along
 MOST_OF_FLIGHTS = 0.9
-#: phases in which the air near the ground acts, and no two flights are alike: no interval lies there
+#: phases in which the air near the ground acts, and no two flights are alike: no interval is made of blocks that lie
+#: there for the most part. Its ends may reach into these phases, when they are moved too
 ENDS = (KINDS.index("take-off"), KINDS.index("landing"))
 
 

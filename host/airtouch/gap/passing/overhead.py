@@ -13,7 +13,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.clock import row_times
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, effect_within
 from airtouch.gap.signatures.scatter import size_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -79,14 +79,18 @@ def path_at(time: np.ndarray, log: FlightLog) -> np.ndarray:
     """Position (n, 3), m, at times (n,) of the log's clock, s; NaN outside of the log and in its holes.
 
     A hole is longer than HOLE_S and than HOLE_PERIODS of the log's own: a straight line across it would make up a path.
+    Raises AirTouchError where the log's clock goes back.
     """
     place = log.stack(POSITION)
     known = np.isfinite(log["t_s"]) & np.isfinite(place).all(axis=1)
     at, place = log["t_s"][known], place[known]
     if len(at) < 2:
         return np.full((len(time), 3), np.nan)
-    out = np.column_stack([np.interp(time, at, values, np.nan, np.nan) for values in place.T])
     steps = np.diff(at)
+    if steps.min() < 0.0:
+        raise AirTouchError(f"{log.source}: its clock t_s goes back after {at[np.argmax(steps < 0.0)]:g} s; a path "
+                            "needs times that rise: cut the log there")
+    out = np.column_stack([np.interp(time, at, values, np.nan, np.nan) for values in place.T])
     step = steps[np.clip(np.searchsorted(at, time, "right") - 1, 0, len(steps) - 1)]
     out[step > max(HOLE_S, HOLE_PERIODS * float(np.median(steps)))] = np.nan
     return out
@@ -104,14 +108,14 @@ def note(study: Study, seconds: Sequence[tuple[float, float]]) -> str:
 def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, float]]) -> Study:
     """The study of a flight over which another vehicle was in these seconds.
 
-    The nominal size of its wake is the median of what a wake seems to be in as many seconds of the rest of this flight;
-    the median, as a vehicle whose path is unknown may be over it as well. It scatters as sizes of wakes that are looked
-    for do in nominal flights, and is theirs where the rest is too short. Without such seconds, and where no baseline
-    flights say how sizes scatter, the study stays as it is.
+    The nominal size of its wake is the median of what a wake seems to be in as many seconds of the rest of this flight
+    in the air; the median, as a vehicle whose path is unknown may be over it as well. It scatters as sizes of wakes
+    that are looked for do in nominal flights, and is theirs where the rest is too short. Without such seconds, and
+    where no baseline flights say how sizes scatter, the study stays as it is.
     """
     if not seconds or study.scatter is None:
         return study
-    data, duration = Data(study, [flight]), sum(b - a for a, b in seconds)
+    data, duration = Data(study, [flight]), sum(b - a for a, b in _air_seconds(flight, seconds))
     rest = [_outside(gate, seconds) for gate in _shifted_gates(flight, seconds)]
     sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_FRACTION * duration]
     middle, spread = study.scatter.passing[OVERHEAD]
@@ -121,9 +125,9 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
 
 
 def _size(data: Data, gate: Gate) -> float:
-    """Size (`size_of`) that what acts overhead seems to have within a gate."""
+    """Size (`size_of`) that what acts overhead seems to have within a gate; its rate is of the seconds in the air."""
     wake = effect_within(data, OVERHEAD, gate)
-    return size_of(wake.gain / data.seconds, wake.strength) if wake is not None else 0.0
+    return size_of(wake.gain / data.air_seconds, wake.strength) if wake is not None else 0.0
 
 
 def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
@@ -137,7 +141,29 @@ def _outside(gate: Gate, seconds: Sequence[tuple[float, float]]) -> Gate:
 
 
 def _shifted_gates(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[Gate]:
-    """Gates of the same seconds at SHIFTS - 1 places beside the known one, around a flight, cut at its end."""
-    length_s = len(flight) * PERIOD_S
-    return [tuple((flight.name, begin := (a + shift) % length_s, min(begin + b - a, length_s)) for a, b in seconds)
-            for shift in np.arange(1, SHIFTS) * length_s / SHIFTS]
+    """Gates of the same seconds at SHIFTS - 1 places beside the known one, around a flight, cut at its end.
+
+    Only seconds in the air count, as if the vehicle never stood: nothing on the ground can be compared with a wake.
+    """
+    in_air, stretches = _air_seconds(flight, seconds), _air_stretches(flight)
+    length_s = sum(end - begin for begin, end, _ in stretches)
+    out = []
+    for shift in np.arange(1, SHIFTS) * length_s / SHIFTS:
+        moved = [(begin := (a + shift) % length_s, min(begin + b - a, length_s)) for a, b in in_air]
+        out.append(tuple((flight.name, max(a, since) + begin - since, min(b, since + end - begin) + begin - since)
+                         for a, b in moved for begin, end, since in stretches if a < since + end - begin and b > since))
+    return out
+
+
+def _air_seconds(flight: Flight, seconds: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Intervals, s, of a flight in its time in the air, which stands still on the ground."""
+    edges = [((begin, end), (since, since + end - begin)) for begin, end, since in _air_stretches(flight)]
+    of_flight, in_air = (np.concatenate(times) for times in zip(*edges, strict=True))
+    return [tuple(np.interp(interval, of_flight, in_air).tolist()) for interval in seconds]
+
+
+def _air_stretches(flight: Flight) -> list[tuple[float, float, float]]:
+    """Stretches of a flight in the air: from and to, s, and the time in the air before it, s."""
+    intervals = intervals_s(flight.phase != GROUND)
+    before = np.cumsum([0.0, *(end - begin for begin, end in intervals)])
+    return [(begin, end, float(u)) for (begin, end), u in zip(intervals, before[:-1], strict=True)]

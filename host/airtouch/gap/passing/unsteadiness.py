@@ -15,30 +15,32 @@ from airtouch.gap.study import Study
 UNSTEADY_TORQUE, UNSTEADY_LIFT = "unsteady_torque", "unsteady_lift"  #: names of the two measures in `Scatter.passing`
 #: columns of the residual whose powers make each of the two
 COLUMNS = {UNSTEADY_TORQUE: tuple(range(TORQUE.start, TORQUE.stop)), UNSTEADY_LIFT: (FORCE.stop - 1,)}
-#: least entropy, without unit, also of flights of which nothing is known; chosen: noise that is equally strong all
-#: along has 0.02 to 0.06. A larger number makes steady flights alike
+#: least entropy, without unit; chosen: noise that is equally strong all along has 0.02 to 0.06. A larger number makes
+#: steady flights alike
 LEAST_ENTROPY = 1e-3
 
 
 def log_entropies(data: Data) -> dict[str, float]:
     """How unsteady torque and lift are, by name: natural logarithms of their `entropy`, LEAST_ENTROPY at least.
 
+    A measure of which nothing is known is left out: the flights are too short to say how steady they are.
     The logarithm scatters more nearly as a Student's variable than the entropy does (host/docs/looks.md, 2026-11-27).
     It is measured once: the evidence for a wake and the verdict both ask for it.
     """
     return data.workspace.cached("log entropies", (), lambda: {
-        name: float(np.log(max(entropy(data, columns), LEAST_ENTROPY))) for name, columns in COLUMNS.items()})
+        name: float(np.log(max(value, LEAST_ENTROPY))) for name, columns in COLUMNS.items()
+        if (value := entropy(data, columns)) is not None})
 
 
-def entropy(data: Data, columns: tuple[int, ...]) -> float:
+def entropy(data: Data, columns: tuple[int, ...]) -> float | None:
     """Log of the arithmetic over the geometric mean of the power of some columns of the residual, piece by piece.
 
     Band and pieces are SHAKE_BAND_HZ and SHAKE_PIECE_S, above the commands by which the vehicle is steered. It is 0
     where the power is the same all along (Wiener entropy, in time), and grows with bursts. Each flight's powers, and
-    each column's, are over their geometric mean; 0 where nothing is known.
+    each column's, are over their geometric mean; None where nothing is known.
     """
     relative = np.concatenate([_relative_powers(data.study, flight, columns) for flight in data.flights])
-    return float(np.log(relative.mean() / np.exp(np.log(relative).mean()))) if len(relative) else 0.0
+    return float(np.log(relative.mean() / np.exp(np.log(relative).mean()))) if len(relative) else None
 
 
 def _relative_powers(study: Study, flight: Flight, columns: tuple[int, ...]) -> np.ndarray:

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 
 from airtouch.gap.features.feature_space import MIDDLE_TWO_THIRDS
 from airtouch.gap.relations.effect_class import ClassCalibration
-from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis
+from airtouch.gap.relations.hypotheses import FlightHypotheses, RelationsHypothesis
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, NAMELESS_ALLOWANCE
 from airtouch.gap.relations.learning import SEED, Drawing, Progress, Scene, Stream, all_drawings, fly, halved, scaled
 from airtouch.gap.relations.library import Coordinates, Library, NominalDistance
@@ -115,7 +115,7 @@ class FittedFlight:
 
     active: Active
     flight: FlightHypotheses
-    hypothesis: Hypothesis
+    hypothesis: RelationsHypothesis
 
     @property
     def shows(self) -> bool:

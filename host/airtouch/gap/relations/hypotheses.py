@@ -37,7 +37,7 @@ class LearnedModel:
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class RelationsHypothesis:
     """Effects at their likeliest strengths, with two log ratios over no effect, nats.
 
     log_likelihood_ratio: of the densities of the flight, at these strengths; evidence: of the density averaged over
@@ -79,19 +79,19 @@ class FlightHypotheses:
 
     def __init__(self, values: np.ndarray, model: LearnedModel) -> None:
         self.values, self.model = values, model
-        self.no_effect = Hypothesis((), 0.0, 0.0)
+        self.no_effect = RelationsHypothesis((), 0.0, 0.0)
 
-    def single_effects(self) -> list[Hypothesis]:
+    def single_effects(self) -> list[RelationsHypothesis]:
         """A hypothesis for every class alone, the likeliest first."""
         return sorted(map(self.with_class, self.model.classes), key=lambda h: -h.evidence)
 
-    def with_class(self, effect_class: EffectClass) -> Hypothesis:
+    def with_class(self, effect_class: EffectClass) -> RelationsHypothesis:
         """The hypothesis of one class alone."""
         base, f = log_density(self.values), fit(effect_class, self.values, self.rescaling(()))
-        return Hypothesis((f,), f.log_peak - base, f.log_marginal - base)
+        return RelationsHypothesis((f,), f.log_peak - base, f.log_marginal - base)
 
-    def with_one_more(self, hypothesis: Hypothesis, allowed: Callable[[EffectClass, Hypothesis], bool],
-                      ) -> list[Hypothesis]:
+    def with_one_more(self, hypothesis: RelationsHypothesis,
+                      allowed: Callable[[EffectClass, RelationsHypothesis], bool]) -> list[RelationsHypothesis]:
         """The hypothesis with each allowed class added, the likeliest first; the others keep their strength."""
         rescaling = self.rescaling(hypothesis.fits)
         residual = rescaling(self.values - hypothesis.shift)
@@ -100,14 +100,14 @@ class FlightHypotheses:
                for c in self.model.classes if allowed(c, hypothesis)]
         return sorted(out, key=lambda h: -h.evidence)
 
-    def with_two(self, one: EffectClass, two: EffectClass) -> Hypothesis:
+    def with_two(self, one: EffectClass, two: EffectClass) -> RelationsHypothesis:
         """The hypothesis of two classes: the second fitted beside the first, then both in turn."""
         first = fit(one, self.values, self.rescaling(()))
         rescaling = rescaling_of(first.loadings())
         second = fit(two, rescaling(self.values - first.shift), rescaling)
         return self.refitted(self.at_fits((first, second)))
 
-    def refitted(self, hypothesis: Hypothesis) -> Hypothesis:
+    def refitted(self, hypothesis: RelationsHypothesis) -> RelationsHypothesis:
         """The hypothesis with its effects fitted in turn, each beside the others."""
         best, fits = hypothesis, list(hypothesis.fits)
         for _ in range(MOST_ROUNDS):
@@ -121,12 +121,12 @@ class FlightHypotheses:
             best = trial
         return best
 
-    def squared_distance(self, hypothesis: Hypothesis) -> float:
+    def squared_distance(self, hypothesis: RelationsHypothesis) -> float:
         """Squared distance of the flight from a hypothesis, relative to the scatter about it."""
         residual = self.rescaling(hypothesis.fits)(self.values - hypothesis.shift)
         return float(residual @ residual)
 
-    def nameless_evidence(self, hypothesis: Hypothesis) -> float:
+    def nameless_evidence(self, hypothesis: RelationsHypothesis) -> float:
         """Evidence over none of a hypothesis with a nameless disturbance beside it, nats."""
         rescaling = self.rescaling(hypothesis.fits)
         residual = rescaling(self.values - hypothesis.shift)
@@ -138,7 +138,7 @@ class FlightHypotheses:
         averaged = float(logsumexp(density + gain) - np.log(len(gain)))
         return averaged - log_density(self.values) + hypothesis.evidence - hypothesis.log_likelihood_ratio
 
-    def at_fits(self, fits: Sequence[Fit], log_occam_factor: float | None = None) -> Hypothesis:
+    def at_fits(self, fits: Sequence[Fit], log_occam_factor: float | None = None) -> RelationsHypothesis:
         """The hypothesis of effects at the strengths of their fits.
 
         log_occam_factor: that of all effects but the last, if known; else the sum of those of their fits.
@@ -148,7 +148,7 @@ class FlightHypotheses:
         ratio = rescaling.log_determinant + log_density(residual) - log_density(self.values)
         factors = [f.log_occam_factor for f in fits]
         total = sum(factors) if log_occam_factor is None else log_occam_factor + factors[-1]
-        return Hypothesis(tuple(fits), ratio, ratio + total)
+        return RelationsHypothesis(tuple(fits), ratio, ratio + total)
 
     def rescaling(self, fits: Sequence[Fit]) -> Rescaling:
         """The rescaling by which the scatter of a flight under effects has the covariance 1; none changes nothing."""

@@ -14,7 +14,7 @@ from scipy.special import logsumexp
 
 from airtouch.gap.evidence.counterevidence import Counterevidence
 from airtouch.gap.relations.effect_class import EffectClass
-from airtouch.gap.relations.hypotheses import FlightHypotheses, Hypothesis, LearnedModel
+from airtouch.gap.relations.hypotheses import FlightHypotheses, LearnedModel, RelationsHypothesis
 from airtouch.gap.relations.library import Library
 from airtouch.gap.relations.readout import Reading, Readout, read_out
 from airtouch.gap.signatures.alike import interchangeable, same_things
@@ -95,7 +95,7 @@ def infer(library: Library, coordinates: np.ndarray) -> Inference:
         readings=_readings(best), without_sign=_without_sign(best))
 
 
-def _readings(best: Hypothesis) -> Mapping[str, Mapping[str, Reading]]:
+def _readings(best: RelationsHypothesis) -> Mapping[str, Mapping[str, Reading]]:
     """Parameters of the effects of a hypothesis, by effect and name.
 
     An effect of which several parameters act gives none: each was calibrated acting alone.
@@ -105,24 +105,24 @@ def _readings(best: Hypothesis) -> Mapping[str, Mapping[str, Reading]]:
             for effect, readout, strength in _calibrated(best) if count[effect] == 1}
 
 
-def _without_sign(best: Hypothesis) -> tuple[str, ...]:
+def _without_sign(best: RelationsHypothesis) -> tuple[str, ...]:
     """The effects of a hypothesis whose strength does not tell their sign."""
     return tuple(effect for effect, readout, strength in _calibrated(best) if not readout.shows_sign(strength))
 
 
-def _calibrated(best: Hypothesis) -> list[tuple[str, Readout, np.ndarray]]:
+def _calibrated(best: RelationsHypothesis) -> list[tuple[str, Readout, np.ndarray]]:
     """Effect, readout and strength of each class of a hypothesis whose strength was calibrated."""
     return [(c.effect, c.calibration.readout, f.strength) for c, f in zip(best.classes, best.fits, strict=True)
             if c.calibration.readout is not None]
 
 
-def _counterevidence(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
+def _counterevidence(flight: FlightHypotheses, best: RelationsHypothesis, library: Library) -> Counterevidence:
     """The evidence against effects, by the measure of the two that is larger relative to its limit."""
     of_two = _nameless_gain(flight, best), _excess_distance(flight, best, library)
     return max(of_two, key=lambda c: c.nats / c.limit)
 
 
-def _nameless_gain(flight: FlightHypotheses, best: Hypothesis) -> Counterevidence:
+def _nameless_gain(flight: FlightHypotheses, best: RelationsHypothesis) -> Counterevidence:
     """What a nameless disturbance gains beside effects."""
     largest = max((c.calibration.nameless_share for c in best.classes), default=0.0)
     share = largest + MODEL_ERROR_SHARE + PAIR_ERROR_SHARE * (len(best.fits) > 1)
@@ -130,7 +130,7 @@ def _nameless_gain(flight: FlightHypotheses, best: Hypothesis) -> Counterevidenc
                            of_distance=False)
 
 
-def _excess_distance(flight: FlightHypotheses, best: Hypothesis, library: Library) -> Counterevidence:
+def _excess_distance(flight: FlightHypotheses, best: RelationsHypothesis, library: Library) -> Counterevidence:
     """How much farther a flight lies from effects than nominal flights from none."""
     largest = max((c.calibration.distance_scatter for c in best.classes), default=0.0)
     distance_scatter = float(np.hypot(largest, library.pair_distance_scatter * (len(best.fits) > 1)))
@@ -149,8 +149,8 @@ def model_of_mean(model: LearnedModel, count: int) -> LearnedModel:
                                         for c in model.classes))
 
 
-def _search(flight: FlightHypotheses, singles: list[Hypothesis], library: Library,
-            ) -> tuple[Hypothesis, Counterevidence]:
+def _search(flight: FlightHypotheses, singles: list[RelationsHypothesis], library: Library,
+            ) -> tuple[RelationsHypothesis, Counterevidence]:
     """The likeliest hypothesis, with no more effects than its evidence supports, and the counterevidence.
 
     A second effect is always tried, a third only where the counterevidence to the two is too much. A third is tried
@@ -169,7 +169,7 @@ def _search(flight: FlightHypotheses, singles: list[Hypothesis], library: Librar
     return best, _counterevidence(flight, best, library) if counterevidence is None else counterevidence
 
 
-def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
+def _required_of_one_more(flight: FlightHypotheses, best: RelationsHypothesis) -> float:
     """Evidence, nats, that a hypothesis with one more effect than this one must have.
 
     It must gain LEAST_EVIDENCE and what wrong second effects gain beside those classes, and explain the flight better
@@ -180,12 +180,12 @@ def _required_of_one_more(flight: FlightHypotheses, best: Hypothesis) -> float:
                flight.nameless_evidence(best) + NAMELESS_MARGIN)
 
 
-def _likeliest_name(hypotheses: Sequence[Hypothesis], library: Library) -> Hypothesis:
+def _likeliest_name(hypotheses: Sequence[RelationsHypothesis], library: Library) -> RelationsHypothesis:
     """The likeliest hypothesis of the likeliest thing: hypotheses that are names of one thing count together.
 
     Each has the weight that the choice among the classes of its effects leaves; evidence counts as in probabilities.
     """
-    groups: list[list[Hypothesis]] = []
+    groups: list[list[RelationsHypothesis]] = []
     for h in hypotheses:
         group = next((g for g in groups if same_things(h.effect_names, g[0].effect_names)), None)
         if group is None:
@@ -199,7 +199,7 @@ def _likeliest_name(hypotheses: Sequence[Hypothesis], library: Library) -> Hypot
     return max(groups[int(np.argmax(weights))], key=lambda h: h.evidence)
 
 
-def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hypothesis]:
+def _with_one_more(flight: FlightHypotheses, beam: list[RelationsHypothesis]) -> list[RelationsHypothesis]:
     """Hypotheses with one more effect, all effects refitted in turn, the likeliest first.
 
     Of the same classes, reached from two hypotheses of the beam, the likelier is kept.
@@ -211,7 +211,7 @@ def _with_one_more(flight: FlightHypotheses, beam: list[Hypothesis]) -> list[Hyp
     return sorted((flight.refitted(h) for h in likeliest), key=lambda h: -h.evidence)
 
 
-def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
+def may_stand_beside(other: EffectClass, hypothesis: RelationsHypothesis) -> bool:
     """Whether a class may be added to a hypothesis.
 
     It may not be another name of an effect in it; it may be another parameter of one, if each parameter has a class.
@@ -220,7 +220,7 @@ def may_stand_beside(other: EffectClass, hypothesis: Hypothesis) -> bool:
     return all(not interchangeable(other.effect, e) or (another and other.effect == e) for e in hypothesis.effect_names)
 
 
-def _by_effect(singles: list[Hypothesis]) -> dict[str, float]:
+def _by_effect(singles: list[RelationsHypothesis]) -> dict[str, float]:
     """Evidence for each effect, nats: the log of the mean of its classes' Bayes factors."""
     by_effect: dict[str, list[float]] = {}
     for h in singles:

@@ -30,7 +30,7 @@ def share(values: Iterable[Any]) -> Figure:
     return wilson(sum(hits), len(hits))
 
 
-def wilson(hits: int, n: int, z: float = 1.959964) -> Figure:
+def wilson(hits: float, n: int, z: float = 1.959964) -> Figure:
     """Share hits / n with Wilson's score interval; without trials anything is possible."""
     if not n:
         return {"value": None, "low": 0.0, "high": 1.0, "hits": 0, "n": 0}
@@ -38,6 +38,16 @@ def wilson(hits: int, n: int, z: float = 1.959964) -> Figure:
     half = z * np.sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / (1.0 + z * z / n)
     return {"value": p, "low": float(max(middle - half, 0.0)), "high": float(min(middle + half, 1.0)),
             "hits": int(hits), "n": int(n)}
+
+
+def share_in_groups(groups: Sequence[Sequence[bool]]) -> Figure:
+    """Share of true values of all groups with their n, and Wilson's interval as of so many values as there are groups.
+
+    The values of a group, such as the parameters of one flight, may be right or wrong together.
+    """
+    hits, n = sum(map(sum, groups)), sum(map(len, groups))
+    of_groups = wilson(hits / n * len(groups), len(groups)) if n else wilson(0, 0)
+    return {**of_groups, "hits": hits, "n": n}
 
 
 def share_text(hits: int, n: int, digits: int = 0) -> str:

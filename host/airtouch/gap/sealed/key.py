@@ -68,7 +68,7 @@ def key_from(table: Mapping[str, Any]) -> Key:
     return Key(flights, table.get("severities", {}), drawn)
 
 
-def key_of(folder: Path) -> Path:
+def key_path(folder: Path) -> Path:
     """Where the key of a set lies by default: beside the set's folder."""
     return folder.resolve().with_name(folder.resolve().name + ".key.json")
 
@@ -95,7 +95,7 @@ def sealed_in(folder: Path) -> dict[str, Any]:
 def seed_of(folder: Path) -> int | None:
     """The seed of a set, by the key beside it, of which no more is read; None where there is no such key."""
     try:
-        return json.loads(key_of(folder).read_text(encoding="utf-8"))["seed"]
+        return json.loads(key_path(folder).read_text(encoding="utf-8"))["seed"]
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -111,7 +111,7 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
     answers: `answers_sha256`; key: its path, beside the folder by default. Raises AirTouchError for a key that was
     changed or cannot be read, and when other answers are already scored: who has seen the key cannot answer blindly.
     """
-    folder, key = Path(folder), Path(key) if key else key_of(Path(folder))
+    folder, key = Path(folder), Path(key) if key else key_path(Path(folder))
     sealed = sealed_in(folder)["key_sha256"]
     try:
         content = key.read_bytes()

@@ -18,7 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
-from airtouch.gap.sealed.key import ANSWERS, OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_of, seal
+from airtouch.gap.sealed.key import ANSWERS, OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_path, seal
 from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
@@ -69,7 +69,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     kinds: of `random_draws.KINDS` to draw from, all of them by default. Raises AirTouchError for others, and when there
     is a set, a key or a flight already and `force` is not given, but for flights of a set that was broken off.
     """
-    out, key = Path(out), Path(key) if key else key_of(Path(out))
+    out, key = Path(out), Path(key) if key else key_path(Path(out))
     if strange := sorted(set(kinds or ()) - set(KINDS)):
         raise AirTouchError(f"{', '.join(strange)}: no kind of effect that is drawn; there are {', '.join(KINDS)}")
     _clear(out, key, force)
@@ -80,7 +80,7 @@ def make(out: Path, flights: int, seed: int = 0, *, key: Path | None = None, for
     for i, log in enumerate(cal):
         write(log, out / f"cal_{i}.csv.gz", force=True)
     progress("calibration")
-    study = study_of(vehicle, cal)
+    study = calibrated_study(vehicle, cal)
     plan = Plan(vehicle, severities_of(study, seed, kinds, progress), seed)
     rng = np.random.default_rng([seed, 1])
     flown_with: dict[str, DrawnFlight] = {}
@@ -161,7 +161,7 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
             for name, low in zip(asked, lowest, strict=True) if low is not None}
 
 
-def study_of(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
+def calibrated_study(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
     """What flights of a set are held against."""
     return calibrate.calibrated(vehicle, list(ready_flights(cal, vehicle, [])))[0]
 

@@ -15,6 +15,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
+from airtouch.gap.sealed.answers import flights_in
 from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in, seed_of
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
@@ -63,7 +64,7 @@ def run(out: Path, flights: int | None = None, seed: int | None = None, *, worke
     if not (out / SEALED).exists():
         make.make(out, FLIGHTS if flights is None else flights, SEED if seed is None else seed, progress=progress)
     answers = out / ANSWERS
-    names = sorted(p.name.removesuffix(".csv.gz") for p in out.glob("flight_*.csv.gz"))
+    names = flights_in(out)
     sealed = sealed_in(out)["flights"]
     for what, asked, there in (("flights", flights, sealed), ("seed", seed, seed_of(out))):
         if None not in (asked, there) and asked != there:
@@ -93,7 +94,7 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
     answers.mkdir(parents=True, exist_ok=True)
     cases = list(cases)
     for left in range(DEATHS, -1, -1):
-        todo = [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
+        todo = _unanswered(answers, cases)
         if not todo:
             return
         study = study or study_in(folder)
@@ -104,7 +105,13 @@ def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ..
                 progress(name)
         except BrokenProcessPool:
             progress(f"a process died; {left} more may")
-    raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+    if _unanswered(answers, cases):
+        raise AirTouchError(f"{folder}: {DEATHS + 1} processes died; is the memory full? The same command goes on")
+
+
+def _unanswered(answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]]) -> list[tuple[str, tuple[str, ...]]]:
+    """The cases that have no file in the folder of the answers."""
+    return [(name, without) for name, without in cases if not _place(answers, name, without).exists()]
 
 
 def _answers(study: Study, tasks: Sequence[Task], workers: int, mapper: Mapper | None) -> Iterator[Answer]:
@@ -127,7 +134,7 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
 
 def study_in(folder: Path) -> Study:
     """The study that a sealed set's own vehicle and nominal flights give."""
-    return make.study_of(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+    return make.calibrated_study(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
 
 
 def _begin(study: Study | None) -> None:

@@ -1,6 +1,5 @@
 """Scores of diagnoses against the opened key: every figure with its n and a 95 % interval."""
 
-import json
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,14 +10,14 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.naming.policy import FIRST_GAIN
-from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share
+from airtouch.gap.sealed.answers import Answer, check_answers, flight_of, flights_in, read_answers
+from airtouch.gap.sealed.intervals import Figure, auroc, median, pooled, share, share_in_groups
 from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import FACTORS, SEEN
 from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
 from airtouch.gap.signatures.candidates import terms
 
-Answer = Mapping[str, Any]  #: a diagnosis as JSON
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
 #: goals of the figures, by their place in `figures` with "/" between keys; host/docs/gap-blind.md has them too
 GOALS = {
@@ -34,6 +33,7 @@ GOALS = {
     "parameters/coverage": "87 to 93 %",
 }
 ROUNDED = 1e-9  #: relative difference of two strengths that are the same
+WRONG_VARIANT = 1.0  #: relative error of parameters of a wrong rotor or loop, as that of an answer of no effect; chosen
 LEAST_GAP = 1.05  #: gap, in units of the floor, above which the share of it that goes is scored; chosen
 
 
@@ -57,31 +57,13 @@ class Sheet:
 
 
 def score(folder: Path, answers: Path, key: Path | None = None) -> dict[str, Any]:
-    """Open the key of a set and score the diagnoses in `answers`: `figures`."""
-    cases = read_answers(answers)
-    return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
+    """Open the key of a set and score the diagnoses in `answers`: `figures`.
 
-
-def read_answers(path: Path) -> list[Answer]:
-    """Diagnoses from a folder of JSON files, one each, or a file of many (`diagnose --each --json`).
-
-    Raises AirTouchError for what is none.
+    The key stays shut where `check_answers` refuses them.
     """
-    path = Path(path)
-    files = sorted(path.glob("*.json")) if path.is_dir() else [path]
-    out: list[Answer] = []
-    for file in files:
-        try:
-            table = json.loads(file.read_text(encoding="utf-8"))
-            out += table["cases"] if "cases" in table else [table]
-        except (OSError, ValueError, TypeError):
-            raise AirTouchError(f"{file}: not the JSON of a diagnosis; write it with `diagnose --json`") from None
-    if not out:
-        raise AirTouchError(f"{path}: no diagnosis in it (*.json)")
-    for case in out:
-        if not isinstance(case, dict) or not case.get("flights") or not case.get("ranking"):
-            raise AirTouchError(f"{path}: a diagnosis without `flights` or `ranking`")
-    return out
+    cases = read_answers(answers)
+    check_answers(cases, flights_in(folder))
+    return figures(open_key(folder, answers_sha256([c for c in cases if not c.get("without")]), key), cases)
 
 
 def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
@@ -111,7 +93,7 @@ def figures(key: Key, cases: Sequence[Answer]) -> dict[str, Any]:
 
 def sheet_of(key: Key, cases: Sequence[Answer]) -> Sheet:
     """The diagnoses beside the key; raises AirTouchError for one of a flight that is not in it."""
-    full_registry = {_name(c): c for c in cases if not c.get("without")}
+    full_registry = {flight_of(c): c for c in cases if not c.get("without")}
     extra = sorted(set(full_registry) - set(key.flights))
     if extra:
         raise AirTouchError(f"{extra[0]}: diagnosed, but not a flight of this set")
@@ -200,12 +182,14 @@ def right_variant(sheet: Sheet) -> Figure:
 def unknown(sheet: Sheet) -> dict[str, Any]:
     """How often flights whose effect was taken out of the registry are called `unknown`, and how likely that is.
 
+    Diagnoses without other effects, in which the true one could be named, do not count.
     said_unknown, wrong_name: share of them with that answer; auroc: of the probability of `unknown`, against the same
     flights with the effect in the registry. wrong_name_told_apart, auroc_told_apart: among those flights whose data
     tell the effect from the names that it was given.
     """
     single, full_registry = sheet.single_effect, sheet.full_registry
-    out = {_name(c): c for c in sheet.cases if c.get("without") and _name(c) in single}
+    out = {n: c for c in sheet.cases if (n := flight_of(c)) in single
+           and any(interchangeable(single[n].name, name) for name in c.get("without") or ())}
     groups = {"all": list(out)}
     groups |= {name: [n for n in out if single[n].level == i] for i, name in enumerate(SEVERITIES)}
     score = {n: _chance(c, "unknown") for n, c in out.items()}
@@ -241,25 +225,47 @@ def shrink(sheet: Sheet) -> dict[str, Any]:
 
 
 def parameters(sheet: Sheet) -> dict[str, Any]:
-    """Parameters of flights rightly named: relative error of each effect's vector, in natural steps; coverage."""
+    """Parameters of single effects that are first and named: relative error of each vector, coverage.
+
+    error, in natural steps, and coverage: whatever the rotor, without answers that free no parameter that was drawn.
+    error_with_variant, coverage_with_variant: of all, where a wrong rotor or loop counts as an error of WRONG_VARIANT
+    and as a miss. The n of a coverage counts parameters, by_effect's that of errors.
+    """
     errors, held = defaultdict(list), defaultdict(list)
+    errors_all, held_all = [], []
     for n, e in sheet.single_effect.items():
         effects = sheet.full_registry[n]["effects"] if sheet.is_first[n] else []
         named = next((f for f in effects if f["name"] == e.name), None)
         if named is None:
             continue
-        term = terms(e.name)[0]
         known = {k: q for k, q in named["parameters"].items() if "low" in q and k in e.values}
-        size = np.sqrt(sum(((e.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
-        if not known or size == 0.0:
-            continue
-        off = np.sqrt(sum(((q["value"] - e.values[k]) / term.step(k)) ** 2 for k, q in known.items()))
-        errors[e.kind].append(float(off / size))
-        held[e.kind] += [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()]
-    all_errors = np.array([x for v in errors.values() for x in v])
-    return {"error": median(all_errors), "coverage": share(x for v in held.values() for x in v),
-            "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share(held[k])}
+        within, error = [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()], _relative_error(e, known)
+        if error is not None:
+            errors[e.kind].append(error)
+            held[e.kind].append(within)
+        if not same_variant(e, named["parameters"]):
+            errors_all.append(WRONG_VARIANT)
+            held_all.append([False] * max(len(known), 1))
+        elif error is not None:
+            errors_all.append(error)
+            held_all.append(within)
+    return {"error": median(np.array([x for v in errors.values() for x in v])),
+            "coverage": share_in_groups([x for v in held.values() for x in v]),
+            "error_with_variant": median(np.array(errors_all)), "coverage_with_variant": share_in_groups(held_all),
+            "by_effect": {k: {"error": float(np.median(v)), "n": len(v), "coverage": share_in_groups(held[k])}
                           for k, v in sorted(errors.items())}}
+
+
+def _relative_error(effect: DrawnEffect, known: Mapping[str, Mapping[str, float]]) -> float | None:
+    """Distance of answered parameters from the drawn ones over their distance from neutral, in natural steps.
+
+    known: the answered ones, as JSON. None where none of them was drawn off neutral.
+    """
+    term = terms(effect.name)[0]
+    size = np.sqrt(sum(((effect.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
+    if size == 0.0:
+        return None
+    return float(np.sqrt(sum(((q["value"] - effect.values[k]) / term.step(k)) ** 2 for k, q in known.items())) / size)
 
 
 def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
@@ -285,12 +291,6 @@ def _true_names(sheet: Sheet) -> dict[str, str]:
     """The right first answer to each flight that was diagnosed, but for pairs: its effect, or "none"."""
     return {n: f.effects[0].name if f.effects else "none" for n, f in sheet.key.flights.items()
             if n in sheet.full_registry and len(f.effects) < 2}
-
-
-def _name(case: Answer) -> str:
-    """Name of the flight of a diagnosis, without folder and endings."""
-    name = Path(case["flights"][0]).name
-    return name.split(".")[0]
 
 
 def _verdict(case: Answer | None) -> str:

@@ -49,7 +49,7 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     update = Update(own, known, worth)
     means = _updated_means(update)
     rms = _updated_rms(update, means, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
-    passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
+    passing = {n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()}
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
 
@@ -75,7 +75,7 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
                              else [pooled])
     # of passing effects the largest count in full: a nominal flight may have met a gust, and the next may too
     names = sorted({n for f in alike for n in f.passing})
-    passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
+    passing = {n: mean_and_deviation(_sizes(alike, n)) for n in names}
     rate = mean_and_deviation(fourth_root([f.rate for f in alike]))
     return Scatter(rms, float(len(alike)), rate, passing, middle=means)
 
@@ -142,6 +142,11 @@ def _column(flights: Sequence[ApparentStrengths], name: str, what: str, k: int) 
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
 
 
+def _sizes(flights: Sequence[ApparentStrengths], name: str) -> list[float]:
+    """Sizes by a name of `ApparentStrengths.passing`, of the flights of which it is known."""
+    return [f.passing[name] for f in flights if name in f.passing]
+
+
 def _log_likelihood(own: Scatter, baseline: Sequence[ApparentStrengths], wide: float) -> float:
     """Log likelihood of the baseline's strengths, rates and sizes in a class; wide: factor of their variance."""
     total, nu = 0.0, own.freedom
@@ -157,8 +162,8 @@ def _log_likelihood(own: Scatter, baseline: Sequence[ApparentStrengths], wide: f
         spread = max(spread, LEAST_RATE_SPREAD)
         total += float(student_log_density(fourth_root(flight.rate), RATE_FREEDOM, mean, spread))
         for name, (mean, spread) in own.passing.items():
-            size = flight.passing.get(name, 0.0)
-            total += float(student_log_density(size, RATE_FREEDOM, mean, max(spread, LEAST_SPREAD)))
+            for size in _sizes([flight], name):
+                total += float(student_log_density(size, RATE_FREEDOM, mean, max(spread, LEAST_SPREAD)))
     return total
 
 
