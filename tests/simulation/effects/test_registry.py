@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import effects, flight, replay, scenario
+from airtouch.simulation import effects, flight, replay, scenario, stepper
 from airtouch.simulation import signals as at
 
 GAP_LIST = {
@@ -73,6 +73,23 @@ def test_strength_goes_to_zero_continuously(short, name):
         log = short({name: effect.scaled(effect.values(), strength)})
         distance.append(np.max(np.abs(as_table(log) - nominal) / (np.std(nominal, axis=0) + 1e-3)))
     assert 0.0 < distance[0] < 0.5, distance
+
+
+@pytest.mark.parametrize("name", sorted(n for n in GAP_LIST if effects.get(n).settings))
+def test_a_second_one_adds_to_the_first_or_is_refused(vehicle, name):
+    effect = effects.get(name)
+    twice = [(name, effect.values()), (name, effect.scaled(effect.values(), 0.0))]
+    if effect.once:
+        with pytest.raises(AirTouchError, match=f"{name} is given twice"):
+            effects.activate(twice)
+        return
+    plants = [stepper.prepare(vehicle, effects.activate(chosen))[0] for chosen in (twice, twice[:1], twice[::-1])]
+    assert plants[0] == plants[1] == plants[2], "one that does nothing changes nothing"
+
+
+def test_two_delays_of_the_optical_flow_add_up(vehicle):
+    plant, _ = stepper.prepare(vehicle, effects.activate([("flow_latency", {"delay": d}) for d in (0.02, 0.015)]))
+    assert plant[0]["flow_delay"] == pytest.approx(0.035)
 
 
 def test_order_given_does_not_matter(short):

@@ -69,7 +69,7 @@ def activate(chosen: Iterable[Active | tuple[str, Mapping[str, float]]] | Mappin
     """Effects with all their values, in the registry's order (so that the order given does not matter).
 
     chosen: {name: {parameter: value}}, or pairs of both where one effect comes twice.
-    Raises AirTouchError for unknown names and values out of bounds.
+    Raises AirTouchError for unknown names, values out of bounds, and a second one of an effect that can be on once.
     """
     if isinstance(chosen, Mapping):
         chosen = list(chosen.items())
@@ -78,6 +78,8 @@ def activate(chosen: Iterable[Active | tuple[str, Mapping[str, float]]] | Mappin
         if not isinstance(item, Active):
             effect = get(item[0])
             item = Active(effect, effect.values(item[1]))
+        if item.effect.once and any(a.effect.name == item.effect.name for a in active):
+            raise AirTouchError(f"{item.effect.name} is given twice; a second one would only replace the first")
         active.append(item)
     order = {name: i for i, name in enumerate(EFFECTS)}
     return sorted(active, key=lambda a: order.get(a.effect.name, len(order)))

@@ -67,6 +67,7 @@ class Effect:
     settings: Callable[[Any, Mapping[str, float]], None] | None = None
     wrench: Any = None
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
+    once: bool = False  #: True: its settings replace values of the plant, so that a second one would undo the first
 
     def __post_init__(self) -> None:
         """Raise AirTouchError for a wrench that nobody compiled and for too many parameters."""

@@ -15,4 +15,4 @@ EFFECT = Effect(
      Parameter("behind", "s", 0.004, 0.0, 0.01, None,
                "of a row behind the last run of position controller and prediction, whole 2 ms",
                "authors' flights: the 2 ms kick of a set-point step is in the log in some flights only")),
-    settings=settings)
+    settings=settings, once=True)

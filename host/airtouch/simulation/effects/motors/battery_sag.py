@@ -17,4 +17,4 @@ EFFECT = Effect(
      Parameter("charge", "1", 0.8, 0.05, 1.0, None, "at take-off"),
      Parameter("resistance", "1", 1.0, 0.0, 10.0, None, "times the declared internal resistance"),
      Parameter("capacity", "1", 1.0, 0.1, 10.0, None, "times the declared capacity")),
-    settings=settings)
+    settings=settings, once=True)

@@ -4,7 +4,7 @@ from airtouch.simulation.effects.effect import Effect, Parameter
 
 
 def settings(plant, v):
-    plant["flow_delay"] = v["delay"]
+    plant["flow_delay"] += v["delay"]
 
 
 EFFECT = Effect(

@@ -26,4 +26,4 @@ EFFECT = Effect(
                "authors' flights: at 9 cm they brake after the entry, at 6 cm and less they do not"),
      Parameter("focus", "m", 0.08, 0.01, 0.3, 0.08, "least distance to which the picture scales",
                "PMW3901: working range from 80 mm")),
-    settings=settings)
+    settings=settings, once=True)

@@ -24,4 +24,4 @@ EFFECT = Effect(
                "VL53L1x: 25 ms of ranging, read every 25 ms"),
      Parameter("reach", "m", 0.0, 0.0, 0.2, 0.0, "a higher surface is seen from this far beside the beam",
                "authors' flights: the lift begins 0.1 s after the reading has changed, and ends 0.1 s before")),
-    settings=settings)
+    settings=settings, once=True)

@@ -15,4 +15,4 @@ EFFECT = Effect(
                "out-of-balance propellers; none clear below 50 Hz in the authors' flights"),
      Parameter("gyro", "rad/m", 0.05, 0.0, 1.0, None,
                "gyro amplitude (rad/s) over the accelerometer's (m/s^2)")),
-    settings=settings)
+    settings=settings, once=True)
