@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from airtouch.twin.comparison.compare import Gap
 from airtouch.twin.comparison.two_sample import Auroc
 
-#: AUROC of the worst phase, or 1 less it, below which twin and flights count as hard to tell apart; random halves of the
-#: authors' flights have up to 0.65 (host/docs/twin-findings.md, can a classifier tell). No other source: round number
+#: AUROC of the worst phase, or 1 less it, below which twin and flights count as hard to tell apart; random halves of
+#: the authors' flights have up to 0.65 (host/docs/twin-findings.md, can a classifier tell). No other source: round
+#: number
 HARD_TO_TELL = 0.6
 
 

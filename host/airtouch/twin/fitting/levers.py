@@ -40,8 +40,8 @@ class Lever:
 
     of: an effect, "vehicle", "mission" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
     axis), or a direction of `channels.ROTOR_SIGNS`. start, low, high, step and spread in `unit`. step: typical change
-    in a round. spread: half width of the range from which each flight draws it, None for one value in all flights. Names and
-    order of the fields are part of `fit.key`: a change makes stored fits those of other settings.
+    in a round. spread: half width of the range from which each flight draws it, None for one value in all flights.
+    Names and order of the fields are part of `fit.key`: a change makes stored fits those of other settings.
     """
 
     of: str
