@@ -111,6 +111,8 @@ def test_switching_an_effect_on_leaves_other_draws_alone(short):
     ("weak_motor:thrust_loss=0.1kg", "needs no unit"),
     ("weak_motor:rotor=2.5", "whole number"),
     ("wind:x", "parameter=value"),
+    ("wind:x=1m/s,x=2m/s", "x is given twice"),
+    ("ground_effect:preset=crazyflie-34g,preset=frame-67g", "preset is given twice"),
 ])
 def test_bad_effects_get_one_clear_line(text, message):
     with pytest.raises(AirTouchError, match=message) as error:

@@ -101,6 +101,8 @@ def parse(text: str) -> tuple[str, dict[str, float]]:
     chosen: dict[str, float | str] = {}
     for part in filter(None, (p.strip() for p in rest.split(","))):
         key, equals, quantity = (piece.strip() for piece in part.partition("="))
+        if key in chosen:
+            raise AirTouchError(f"{text!r}: {key} is given twice")
         if key == "preset" and equals:
             chosen[key] = quantity
             continue
