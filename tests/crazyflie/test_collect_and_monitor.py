@@ -197,6 +197,21 @@ def test_a_setting_that_is_never_answered_is_told(serve, hop, cache, tmp_path):
             drone.close()
 
 
+def test_a_reset_of_the_estimate_is_no_value_that_the_drone_keeps(serve, cache):
+    with serve() as virtual:
+        drone = Drone(virtual.uri, cache)
+        try:
+            virtual.clock.wait_for(lambda: drone.crazyflie.param.is_updated)
+            drone.set_parameter("kalman.initialX", "2")
+            readiness.reset_estimator(drone)
+            assert virtual.drone.estimate[6] == pytest.approx(2.0, abs=0.05)
+            drone.crazyflie.param.request_param_update("kalman.resetEstimation")
+            virtual.clock.sleep(0.1)
+            assert drone.parameter("kalman.resetEstimation") == 0.0
+        finally:
+            drone.close()
+
+
 def test_firmware_without_a_variable_is_told_which(serve, hop, cache, tmp_path, monkeypatch):
     def fewer(drone):
         return {name: kind for name, kind in log_variables(drone).items() if name not in ("motor.m3", "pm.vbat")}

@@ -51,6 +51,19 @@ step = [{ do = "wait", time_s = 1.0 }, { do = "take-off", height_m = 0.5 }, { do
     assert legs[4].z_m == 0.0 and legs[4].seconds >= 0.5 / 0.3
 
 
+def test_the_speed_is_that_of_the_longest_level_leg(tmp_path):
+    path = tmp_path / "climb.toml"
+    path.write_text("""
+[mission]
+step = [{ do = "wait", time_s = 1.0 }, { do = "take-off", height_m = 0.5 }, { do = "hover", time_s = 1.0 },
+        { do = "go", to_m = [2.0, 0.0], speed_mps = 0.5 }, { do = "hover", time_s = 1.0 },
+        { do = "go", to_m = [2.0, 0.0], height_m = 1.3, speed_mps = 0.1 }, { do = "hover", time_s = 1.0 }]
+""")
+    legs = mission.load(path).legs
+    assert max(leg.seconds for leg in legs if leg.kind == "go") == pytest.approx(8.0), "the climb is the longest"
+    assert mission.load(path).speed_mps == pytest.approx(0.5)
+
+
 def test_ready_missions_cross_edges_low_enough_to_be_felt():
     for name in mission.names():
         ready = mission.load(name)

@@ -24,6 +24,9 @@ class Drone:
     def set_parameter(self, name, text):
         self.changes.append((name, text))
 
+    def trigger(self, name):
+        self.changes.append((name, "1"))
+
 
 def test_a_deck_is_attached_or_not_or_not_known():
     drone = Drone({"deck.bcFlow2": 1, "deck.bcAI": 0, "deck.bcLoco": None})

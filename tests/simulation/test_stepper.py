@@ -1,15 +1,18 @@
 """A flight flown in pieces is the flight flown in one call, bit for bit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airtouch import vehicle
 from airtouch.errors import AirTouchError
-from airtouch.simulation import loop, scenario
-from airtouch.simulation.effects import Active, Effect
+from airtouch.simulation import loop, scenario, signals
+from airtouch.simulation.effects import Active, Effect, activate
 from airtouch.simulation.flight import choose
+from airtouch.simulation.plant import hover_speed
 from airtouch.simulation.sensors import log_row
-from airtouch.simulation.stepper import Stepper
+from airtouch.simulation.stepper import Stepper, prepare
 
 
 @pytest.mark.parametrize("name", ["paper-9cm", "gusts", "randomised"])
@@ -83,3 +86,15 @@ def test_a_delay_beyond_its_line_is_refused(field, fits, wraps):
     for bad in (wraps, np.nan, -0.01):
         with pytest.raises(AirTouchError, match=field):
             Stepper(plan, vehicle.load(), 1, 0, with_delay(field, bad))
+
+
+@pytest.mark.parametrize("heavier", [0.0, 0.5])
+def test_a_vehicles_own_rotor_drag_is_that_of_its_rotors_speed_whatever_it_carries(heavier):
+    per_rad = 4e-6  # N per (rad/s) and (m/s)
+    own = replace(vehicle.load(), rotor_drag_kg_per_rad=per_rad)
+    plant, acting = prepare(own, activate({"mass": {"fraction": heavier}}))
+    s, force = np.zeros(signals.COUNT), np.zeros(6)
+    s[signals.ROTOR_SPEED:signals.ROTOR_SPEED + 4], s[signals.VELOCITY] = 1500.0, 0.7
+    s[signals.HOVER_SPEED] = hover_speed(plant)
+    acting[0].effect.wrench(acting[0].effect.vector(acting[0].values), s, np.zeros(12), np.zeros(1, np.uint64), force)
+    np.testing.assert_allclose(force[:3], [-per_rad * 4 * 1500.0 * 0.7, 0.0, 0.0])

@@ -13,7 +13,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 from airtouch.sitl import Server
 from airtouch.sitl.drone import CRASHED, LOCKED, PRE_FLIGHT
-from airtouch.sitl.services.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PLATFORM, SUPERVISOR
+from airtouch.sitl.services.packet import COMMANDER, CONSOLE, GENERIC, LOCALIZATION, PARAM, PLATFORM, SUPERVISOR
 
 HOVER, POSITION, VELOCITY, Z_DISTANCE, MANUAL, STOP = 10, 7, 8, 9, 11, 0
 QUIET = {"without": ["gust"]}
@@ -110,6 +110,36 @@ def bits(craft):
     answer, = craft.take(SUPERVISOR, 0, [0x0C])
     assert answer.data[0] == 0x8C
     return int.from_bytes(answer.data[1:], "little")
+
+
+def test_a_reset_puts_the_estimate_where_the_parameters_say(bench):
+    """As estimatorKalmanTask: `if (resetEstimation) {estimatorKalmanInit(); resetEstimation = false;}`."""
+    craft = bench(**QUIET)
+
+    def write(name, layout, value):
+        number = struct.pack("<H", craft.firmware.param.toc.ids[name])
+        craft.take(PARAM, 2, number + struct.pack(layout, value))
+        return craft.take(PARAM, 1, number)[0].data[3:]
+
+    keep(craft, 3.0, POSITION, 0.0, 0.0, 0.5, 0.0)
+    keep(craft, 4.0, POSITION, 0.4, 0.0, 0.5, 30.0)
+    keep(craft, 3.0, POSITION, 0.4, 0.0, 0.0, 30.0)
+    craft.take(GENERIC, 0, bytes([STOP]))
+    craft.fly(3.0)
+    assert craft.drone.estimate[6] > 0.2 and craft.drone.estimate[2] > 0.3
+    before = place(craft)
+    assert write("kalman.resetEstimation", "<B", 1) == b"\0", "the firmware clears it"
+    craft.fly(1.0)
+    np.testing.assert_allclose(craft.drone.estimate[[0, 1, 2, 6, 7]], 0.0, atol=0.03)
+    write("kalman.initialY", "<f", -1.5)
+    write("kalman.initialYaw", "<f", 1.2)
+    write("kalman.resetEstimation", "<B", 1)
+    craft.fly(1.0)
+    np.testing.assert_allclose(craft.drone.estimate[[2, 6, 7]], [1.2, 0.0, -1.5], atol=0.03)
+    np.testing.assert_allclose(place(craft), before, atol=0.01)
+    keep(craft, 3.0, POSITION, 0.0, -1.5, 0.5, math.degrees(1.2))
+    assert craft.height == pytest.approx(0.5, abs=0.1)
+    np.testing.assert_allclose(place(craft)[:2], before[:2], atol=0.15)  # it takes off where it stands
 
 
 def test_a_fall_from_high_up_is_a_crash_that_can_be_recovered_from(bench):

@@ -66,6 +66,7 @@ def test_command_trains_says_and_goes_on(sweeps, quick, tmp_path, monkeypatch):
     first = CliRunner().invoke(airtouch, arguments)
     assert first.exit_code == 0, first.output + str(first.exception)
     assert "5 flights that their down range labels" in first.output
+    assert "hold these flights' free air and strength of edges" in first.output
     assert "held out, all others: error" in first.output and "5 flights, 10 edges" in first.output
     repeat = CliRunner().invoke(airtouch, arguments)
     assert repeat.exit_code != 0 and "--force" in str(repeat.exception)

@@ -15,6 +15,7 @@ from airtouch.crazyflie.mission import LANDING_MPS, Leg
 RESEND_S = 0.3  #: s without an answer, after which a command is sent again
 SILENT_S = 1.0  #: s without a packet, after which nothing is sent until one comes; chosen
 TRIES = 8  #: times that a command is sent; after that it counts as accepted if log packets still arrive
+LATE_S = 1.0  #: s after which an answer that has not come counts as lost; assumed
 SETTLE_S = 1.0  #: s from the end of a landing to the stop of the motors
 BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
 
@@ -50,6 +51,7 @@ class Autopilot:
     _sent_s: float = -math.inf
     _until_s: float = -math.inf
     _wall_sent_s: float = -math.inf
+    _unanswered_s: list[float] = field(default_factory=list)  #: host's clock, sends of this kind without an answer
 
     @property
     def leg(self) -> Leg | None:
@@ -64,9 +66,15 @@ class Autopilot:
     def answer(self, kind: str, code: int) -> None:
         """Handle the drone's answer to a command: its kind and an error code, 0 for accepted.
 
-    Late answers to earlier commands are ignored.
-    """
-        if self._command is None or kind != self._command.kind or self._answered:
+        An answer names only the kind of its command. Answers come in the order of the commands, so as many as
+        earlier commands of this kind are owed are ignored. One that is lost (LATE_S) is not waited for; where it was
+        counted all the same, the command is sent once more than necessary.
+        """
+        if self._command is None or kind != self._command.kind:
+            return
+        if self._unanswered_s:
+            self._unanswered_s.pop(0)
+        if self._answered or len(self._unanswered_s) >= self._tries:
             return
         repeated = self._tries > 1  # the first may have been accepted and its answer lost
         if code == 0 or self.phase == "landing" or (repeated and code != BUSY):
@@ -125,6 +133,9 @@ class Autopilot:
         return self._send(Command("land", z_m=self.origin.z_m, seconds=seconds), now_s, wall_s)
 
     def _send(self, command: Command, now_s: float, wall_s: float) -> list[Command]:
+        same = self._command is not None and self._command.kind == command.kind
+        owed = [sent_s for sent_s in self._unanswered_s if same and wall_s - sent_s < LATE_S]
+        self._unanswered_s = [*owed, wall_s]
         self._command, self._answered, self._tries = command, False, 1
         self._sent_s, self._wall_sent_s = now_s, wall_s
         rest = SETTLE_S if command.kind == "land" else 0.0

@@ -17,6 +17,7 @@ from airtouch.simulation.firmware import setpoint as c
 from airtouch.simulation.flight_plan.mission import RATE_HZ
 
 SHORTEST_S = 0.05  #: s; a shorter stop is a corner, no hover
+LEVEL_M = 1e-3  #: m; a leg that ends so near to its first height is level
 LANDING_MPS = 0.3  #: m/s; assumed, within the firmware's range for landings
 
 
@@ -75,7 +76,9 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
     scene = scene_of(name_or_path)
     plan = scenario.draw_flight(scene, seed, flight)
     legs = legs_of(plan.setpoints)
-    level = [(leg.seconds, speed) for leg, speed in zip(legs, _speeds(legs), strict=True) if leg.kind == "go"]
+    before = [0.0, *(leg.z_m for leg in legs)]
+    level = [(leg.seconds, speed) for leg, speed, z_m in zip(legs, _speeds(legs), before, strict=False)
+             if leg.kind == "go" and abs(leg.z_m - z_m) < LEVEL_M]
     return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
 
 

@@ -138,7 +138,7 @@ def firmware(drone: Drone) -> str:
 def start_over(drone: Drone) -> None:
     """Put a virtual drone back to its start. A real drone is left alone."""
     if drone.has_parameter(START_OVER):
-        drone.set_parameter(START_OVER, "1")
+        drone.trigger(START_OVER)
 
 
 def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
@@ -156,9 +156,7 @@ def standing_still(drone: Drone, slow: blocks.Block | None) -> Intake:
 def reset_estimator(drone: Drone) -> None:
     """Reset the position estimate to zero at this place, if the firmware has the parameter for it."""
     if drone.has_parameter("kalman.resetEstimation"):
-        drone.set_parameter("kalman.resetEstimation", "1")
-        time.sleep(0.1)
-        drone.set_parameter("kalman.resetEstimation", "0")
+        drone.trigger("kalman.resetEstimation")  # estimatorKalmanTask clears it within a millisecond
         time.sleep(RESET_S)
 
 

@@ -26,13 +26,13 @@ def prepare(vehicle: Vehicle, active: Sequence[Active]) -> tuple[np.ndarray, lis
     The vehicle's own rotor drag flies as the effect of that name.
     """
     plant = from_vehicle(vehicle)
-    acting = [a for a in active if a.effect.wrench is not None]
-    if vehicle.rotor_drag_kg_per_rad > 0.0:
-        drag = vehicle.rotor_drag_kg_per_rad * 4.0 * hover_speed(plant)
-        acting += registry.activate({"rotor_drag": {"horizontal": drag}})
     for a in active:
         if a.effect.settings is not None:
             a.effect.settings(plant[0], a.values)
+    acting = [a for a in active if a.effect.wrench is not None]
+    if vehicle.rotor_drag_kg_per_rad > 0.0:  # per rotor speed; the effect's is at the hover speed of this plant
+        drag = vehicle.rotor_drag_kg_per_rad * 4.0 * hover_speed(plant)
+        acting += registry.activate({"rotor_drag": {"horizontal": drag}})
     return plant, acting
 
 

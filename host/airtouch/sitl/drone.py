@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.simulation import loop
+from airtouch.simulation.compiled import jit
 from airtouch.simulation.effects import Active
-from airtouch.simulation.firmware import setpoint
+from airtouch.simulation.firmware import kalman, setpoint
 from airtouch.simulation.scenario import FlightPlan
 from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
@@ -127,6 +128,10 @@ class Drone:
         if self._drained:
             self.drain()
 
+    def reset_estimate(self, x_m: float, y_m: float, z_m: float, yaw_rad: float) -> None:
+        """Start the estimate anew at this place and heading, at rest and level: estimatorKalmanInit()."""
+        _reset_estimate(self._stepper.plant, self._stepper.state, x_m, y_m, z_m, yaw_rad)
+
     def drain(self) -> None:
         """Make the battery nearly empty."""
         self._drained = True
@@ -180,3 +185,14 @@ class Drone:
         self._begin(place)
         self._setpoint[0] = place
         self._stepper.fly(self._setpoint, self._table)
+
+
+@jit
+def _reset_estimate(plants, states, x_m, y_m, z_m, yaw_rad):
+    """Start the Kalman filter of a flight's state (1,) anew; its plant (1,) has the settings."""
+    firmware = states[0].firmware
+    q = firmware.quaternion
+    q[0], q[1], q[2], q[3] = math.cos(0.5 * yaw_rad), 0.0, 0.0, math.sin(0.5 * yaw_rad)
+    kalman.begin(plants[0].firmware, firmware.kalman, x_m, y_m, z_m, q)
+    firmware.kalman.updated = 1
+    kalman.finalize(firmware.kalman)

@@ -9,7 +9,7 @@ from airtouch.sitl.services import packet as crtp
 from airtouch.sitl.services.log_service import LogService
 from airtouch.sitl.services.packet import Packet
 from airtouch.sitl.services.param_service import ParamService
-from airtouch.sitl.services.variables import START_OVER
+from airtouch.sitl.services.variables import INITIAL, RESET_ESTIMATE, START_OVER
 
 PROTOCOL = 12
 VERSION, DEVICE = b"2026.08 virtual", b"CF21"
@@ -128,6 +128,9 @@ class Firmware:
             return drone.app.values()
         if name == START_OVER and value:
             drone.start_over()
+        elif name == RESET_ESTIMATE and value:
+            drone.reset_estimate(*(self.param.values[initial] for initial in INITIAL))
+            return {name: 0}
         elif name == "stabilizer.stop" and value:
             drone.stop()
         elif name == "hlCommander.vtoff":

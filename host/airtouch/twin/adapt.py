@@ -76,10 +76,12 @@ class SimulatedFlights:
 
 @dataclass(frozen=True)
 class Adapted:
-    """The model, and scores of held-out flights after training on all others and on half of them (both may be empty).
+    """The model, and scores of held-out flights after training on the other folds and on half of them.
 
-    twin_only: scores of all labelled flights by the detector that was trained on the twin alone. left_out: (file,
-    reason) of flights that could not be used. `plain()` says all of it in figures.
+    Both are empty without a hold-out. Only the labels are held out: twin, strengths of edges and free air come from
+    all labelled flights, and are in every training. twin_only: scores of all labelled flights by the detector that was
+    trained on the simulated flights alone, so also on these flights' free air and strengths. left_out: (file, reason)
+    of flights that could not be used. `plain()` says all of it in figures.
     """
 
     model: BestModel
@@ -237,8 +239,9 @@ def held_out_scores(trainer: Trainer, twin: BestModel, flights: Sequence[LoadedF
                     progress: Progress | None = None) -> tuple[list[FlightScore], list[FlightScore]]:
     """Scores of the labelled flights by cross-validation: trained on all other folds, and on half of their flights.
 
-    The labelled flights are assigned to FOLDS folds by seed; those without labels are in every training. Models and
-    scores are stored in `work` under `key`.
+    The labelled flights are assigned to FOLDS folds by seed; those without labels are in every training, as are the
+    simulated flights, which hold the free air and the strengths of edges of the flights held out. Models and scores
+    are stored in `work` under `key`.
     """
     labelled = [f for f in flights if f.labelled]
     unlabelled = [f for f in flights if not f.labelled]

@@ -42,7 +42,9 @@ def strengths(flights: Sequence[FlightLog], responses: Sequence[Response],
     """The factor for each kind of edge and class of height of which there are MIN_FLIGHTS flights and responses.
 
     Least squares of the recorded median course on the simulated one, vertical acceleration and motor mean together,
-    within the bounds. Flights whose down range shows no platform do not count.
+    within the bounds. Flights whose down range shows no platform do not count. The heights that class them are not the
+    same one: a recorded flight's is the median over its pass, a response's that just after its entry, here and in
+    `scale` and `balance_heights`. A flight near the bound of a class may so be in another than its simulated likeness.
     """
     recorded: dict[tuple[str, str], list[np.ndarray]] = {}
     simulated: dict[tuple[str, str], list[np.ndarray]] = {}

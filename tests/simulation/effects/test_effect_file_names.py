@@ -25,6 +25,7 @@ EFFECT = Effect("late_push", "begins half-way",
                 (Parameter("force", "N", 0.01, 0.0, 0.1, 0.0, ""), Parameter("since", "s", 8.0, 0.0, 100.0, None, ""),
                  Parameter("lag", "1", 1.0, 0.5, 3.0, 1.0, "")), settings=slower, wrench=push)
 '''
+CONSTANTS = "A, B, _, C = range(4)\nKEPT = 50\ni = 99\n"
 
 
 @pytest.mark.parametrize(("name", "typo", "message"), [
@@ -47,10 +48,10 @@ def test_a_wrong_name_has_its_line_and_the_nearest(tmp_path, name, typo, message
 def test_right_names_pass_and_are_the_tables():
     names.check(FILE, "mine.py")
     page = table.names_table()
-    assert all(f"`at.{name}`" in page for name in names.SIGNALS if name != "COUNT")
+    assert all(f"`at.{name}`" in page for name in names.SIGNALS)
     assert all(f"| `{name}` |" in page for name, *_ in plant.FIELDS)
     rows = table.signal_rows()
-    assert len(rows) == len(names.SIGNALS) - 1 and sum(count for _, count, _ in rows) == 73
+    assert len(rows) == len(names.SIGNALS) and sum(count for _, count, _ in rows) == 73
 
 
 def test_a_mistyped_effect_gets_the_nearest():
@@ -64,12 +65,26 @@ def test_a_mistyped_effect_gets_the_nearest():
     ("@wrench\n", "", "effect late_push: put @wrench above the function push"),
     ("p[1]:", "p[3]:", "mine.py:7: p[3] does not exist; the last place is p[2]"),
     ("out[2]", "out[6]", "mine.py:8: out[6] does not exist; the last place is out[5]"),
+    ("p[0] *", "p[-1] *", "mine.py:8: p[-1] does not exist"),
+    ("s[at.HEIGHT]", "s[at.COUNT]", "mine.py:8: no signal 'COUNT'"),
+    ("s[at.HEIGHT]", "s[200]", "mine.py:8: s[200] does not exist; the last place is s[72]"),
+    ("s[at.HEIGHT]", "s[at.POSITION + 3]", "mine.py:8: s[at.POSITION + 3] does not exist; the last place is s[72]"),
+    ("s[at.HEIGHT]", "s[-74]", "mine.py:8: s[-74] does not exist"),
+    ("p[0] *", "memory[KEPT] *", "mine.py:8: memory[KEPT] does not exist; the last place is memory[11]"),
+    ("p[0] *", "p[C] *", "mine.py:8: p[C] does not exist; the last place is p[2]"),
+    ("p[0] *", "p[-13] *", "mine.py:8: p[-13] does not exist"),
     ("p[0] *", "memory[12] *", "mine.py:8: memory[12] does not exist; the last place is memory[11]"),
 ])
 def test_what_compiled_code_would_not_notice_is_refused_with_its_line(name, replacement, message):
     with pytest.raises(AirTouchError) as error:
-        effects.load_text(FILE.replace(name, replacement), "mine.py")
+        effects.load_text(FILE.replace(name, replacement) + CONSTANTS, "mine.py")
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("place", ["A", "2", "i"])
+def test_places_that_are_there_pass(place):
+    text = FILE.replace("    if s[at", "    i = 0\n    if s[at").replace("p[0] *", f"memory[{place} + 9] *")
+    names.check(text.replace("s[at.HEIGHT]", "s[at.POSITION + 2]") + CONSTANTS, "mine.py")
 
 
 def test_a_file_that_is_no_text_is_one_line(tmp_path):

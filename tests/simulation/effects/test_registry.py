@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
-from airtouch.simulation import effects, flight, replay, scenario
+from airtouch.simulation import effects, flight, replay, scenario, stepper
 from airtouch.simulation import signals as at
 
 GAP_LIST = {
@@ -75,6 +75,23 @@ def test_strength_goes_to_zero_continuously(short, name):
     assert 0.0 < distance[0] < 0.5, distance
 
 
+@pytest.mark.parametrize("name", sorted(n for n in GAP_LIST if effects.get(n).settings))
+def test_a_second_one_adds_to_the_first_or_is_refused(vehicle, name):
+    effect = effects.get(name)
+    twice = [(name, effect.values()), (name, effect.scaled(effect.values(), 0.0))]
+    if effect.once:
+        with pytest.raises(AirTouchError, match=f"{name} is given twice"):
+            effects.activate(twice)
+        return
+    plants = [stepper.prepare(vehicle, effects.activate(chosen))[0] for chosen in (twice, twice[:1], twice[::-1])]
+    assert plants[0] == plants[1] == plants[2], "one that does nothing changes nothing"
+
+
+def test_two_delays_of_the_optical_flow_add_up(vehicle):
+    plant, _ = stepper.prepare(vehicle, effects.activate([("flow_latency", {"delay": d}) for d in (0.02, 0.015)]))
+    assert plant[0]["flow_delay"] == pytest.approx(0.035)
+
+
 def test_order_given_does_not_matter(short):
     chosen = [("mass", {"fraction": 0.1}), ("wind", {"x": 0.2}), ("gust", {})]
     np.testing.assert_array_equal(as_table(short(chosen)), as_table(short(chosen[::-1])))
@@ -94,6 +111,8 @@ def test_switching_an_effect_on_leaves_other_draws_alone(short):
     ("weak_motor:thrust_loss=0.1kg", "needs no unit"),
     ("weak_motor:rotor=2.5", "whole number"),
     ("wind:x", "parameter=value"),
+    ("wind:x=1m/s,x=2m/s", "x is given twice"),
+    ("ground_effect:preset=crazyflie-34g,preset=frame-67g", "preset is given twice"),
 ])
 def test_bad_effects_get_one_clear_line(text, message):
     with pytest.raises(AirTouchError, match=message) as error:

@@ -16,6 +16,10 @@ def auroc(phase, value):
     ({"cruise": 0.52, "edges": 0.59}, ("hardly", "0.59", "edges"), ("0.52",)),
     ({"cruise": 0.52, "edges": 0.61}, ("0.520 (cruise)", "0.610 (edges)"), ("hardly",)),
     ({"cruise": 0.999, "edges": 0.7}, ("0.700 (edges)", "0.999 (cruise)"), ("hardly",)),
+    ({"cruise": float("nan"), "edges": 0.59}, ("hardly", "0.59", "edges"), ("nan", "cruise")),
+    ({"edges": float("nan")}, ("Too few flights",), ("AUROC", "nan")),
+    ({"cruise": 0.52, "edges": 0.05}, ("0.520 (cruise)", "0.050 (edges)"), ("hardly",)),
+    ({"cruise": 0.52, "edges": 0.43}, ("hardly", "0.43 at least (edges)"), ("0.52",)),
     ({}, ("Too few flights",), ("AUROC",)),
 ])
 def test_the_sentence_names_the_phase_that_is_told_best(values, present, absent):

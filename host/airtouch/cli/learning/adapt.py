@@ -50,8 +50,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
 
     It starts from the shipped weights, trains in the twin, and then on the flights themselves: their down range
     labels them. Flights without down range are labelled by the detector from the twin. With four flights or more
-    over a platform, each is held out in turn to measure what to expect. Finished stages are stored beside --out, in a
-    folder that ends in .adapt: the same command continues after a stop.
+    over a platform, the labels of a quarter of them are held out in turn to measure what to expect. Finished stages
+    are stored beside --out, in a folder that ends in .adapt: the same command continues after a stop.
     """
     from airtouch import vehicle as vehicles
     from airtouch.detector import best
@@ -104,6 +104,9 @@ def _say(adapted: Any, labelled: int, hold_out: bool) -> None:
     for name, scores in rows.items():
         if scores:
             click.echo(f"{name}: {in_words(summary.summarise(scores))}")
+    if adapted.twin_only and "free_air_of" in adapted.model.metadata.get("adapted", {}).get("twin", {}):
+        click.echo("the simulated flights of every training hold these flights' free air and strength of edges: new "
+                   "ones may do worse")
     if any(s.in_training for s in adapted.twin_only):
         click.echo("the weights it started from have seen some of these flights: these figures are too good; "
                    "--from scratch measures without them")

@@ -5,7 +5,7 @@ import queue
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -94,14 +94,38 @@ class Drone:
 
     def set_parameter(self, name: str, text: str, patience_s: float = 10.0) -> None:
         """Set a parameter and read it back. Raises AirTouchError if the drone does not have it or keep the value."""
+        value = representable(name, text, self._writable(name).ctype)
+        deadline = time.monotonic() + patience_s
+        with self._updates(name) as updates:
+            self._write(name, value, updates, deadline)
+            time.sleep(TAKEN_S)  # the first answer repeats the request; the app may still change the value
+            stored = _next(updates, deadline, lambda: self.crazyflie.param.request_param_update(name))
+        if stored is None:
+            raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
+        if not abs(stored - value) <= 1e-6 * max(abs(value), 1.0):  # NaN is not the value either
+            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {stored:g}")
+
+    def trigger(self, name: str, patience_s: float = 10.0) -> None:
+        """Write 1 to a parameter that starts something; the firmware clears it itself, so it is not read back.
+
+        Raises AirTouchError if the drone does not have it or does not answer.
+        """
+        self._writable(name)
+        with self._updates(name) as updates:
+            self._write(name, 1, updates, time.monotonic() + patience_s)
+
+    def _writable(self, name: str) -> Any:
+        """cflib's entry of a parameter. Raises AirTouchError if the drone does not have it or only reads it."""
         element = self.crazyflie.param.toc.get_element(*name.split(".", 1))
         if element is None:
             raise AirTouchError(f"{name}: this firmware has no such parameter")
         if element.get_readable_access() == "RO":
             raise AirTouchError(f"{name}: this parameter is read-only")
-        value = representable(name, text, element.ctype)
-        if self.parameter(name, patience_s) is None:
-            raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
+        return element
+
+    @contextlib.contextmanager
+    def _updates(self, name: str) -> Iterator[list[float]]:
+        """The values of a parameter that arrive meanwhile, in a list that grows."""
         updates: list[float] = []
 
         def update(_: str, text: str) -> None:
@@ -109,19 +133,19 @@ class Drone:
 
         group, short = name.split(".", 1)
         self.crazyflie.param.add_update_callback(group, short, update)
-        deadline = time.monotonic() + patience_s
         try:
-            while not self.crazyflie.param.is_updated and time.monotonic() < deadline:
-                time.sleep(0.02)
-            _next(updates, deadline, lambda: self.crazyflie.param.set_value(name, value))
-            time.sleep(TAKEN_S)  # the first answer repeats the request; the app may still change the value
-            stored = _next(updates, deadline, lambda: self.crazyflie.param.request_param_update(name))
+            yield updates
         finally:
             self.crazyflie.param.remove_update_callback(group, short, update)
-        if stored is None:
+
+    def _write(self, name: str, value: float, updates: list[float], deadline: float) -> None:
+        """Write a parameter and wait for the answer. Raises AirTouchError without one."""
+        if self.parameter(name, deadline - time.monotonic()) is None:
+            raise AirTouchError(f"{name}: the drone does not tell its value; is the link good?")
+        while not self.crazyflie.param.is_updated and time.monotonic() < deadline:
+            time.sleep(0.02)
+        if _next(updates, deadline, lambda: self.crazyflie.param.set_value(name, value)) is None:
             raise AirTouchError(f"{name}: the drone did not answer; is the link good?")
-        if not abs(stored - value) <= 1e-6 * max(abs(value), 1.0):  # NaN is not the value either
-            raise AirTouchError(f"{name} = {text}: out of range; the drone kept {stored:g}")
 
     @property
     def protocol(self) -> int:

@@ -19,7 +19,8 @@ class Intake:
     """Converts packets to rows with `take`.
 
     received: packets of the fast block; first_ms, newest_ms: their first and newest time, drone's clock.
-    last_arrival_s: of any packet, host's clock. latest: the newest values by column.
+    last_arrival_s: of a packet of the fast block, host's clock: without that block a flight lands and the blocks are
+    requested again, whether the link or the block is lost. latest: the newest values by column.
     """
 
     slow: Block | None

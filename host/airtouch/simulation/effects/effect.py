@@ -67,6 +67,7 @@ class Effect:
     settings: Callable[[Any, Mapping[str, float]], None] | None = None
     wrench: Any = None
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  #: values measured together
+    once: bool = False  #: True: its settings replace values of the plant, so that a second one would undo the first
 
     def __post_init__(self) -> None:
         """Raise AirTouchError for a wrench that nobody compiled and for too many parameters."""
@@ -108,7 +109,11 @@ class Effect:
         return result
 
     def scaled(self, values: Mapping[str, float], strength: float) -> dict[str, float]:
-        """`values` moved towards neutral: strength 1 leaves them, 0 switches the effect off."""
+        """`values` moved towards neutral: strength 1 leaves them, 0 makes them neutral.
+
+        Those without a neutral value stay. One of them acts at strength 0 too: `behind` of time_jitter, where it is
+        not the plant's own 0.004 s.
+        """
         return {p.name: values[p.name] if p.neutral is None
                 else p.neutral + strength * (values[p.name] - p.neutral) for p in self.parameters}
 

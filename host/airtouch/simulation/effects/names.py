@@ -4,20 +4,23 @@ A wrong one is told with its line and what is near.
 """
 
 import ast
-from collections.abc import Iterator
+import operator
+from collections.abc import Iterator, Mapping
 
 from airtouch.errors import AirTouchError, nearest
 from airtouch.simulation import plant, signals
 from airtouch.simulation.effects.effect import MEMORY, PARAMETERS
 
-SIGNALS = tuple(name for name in vars(signals) if name.isupper())
+SIGNALS = tuple(name for name in vars(signals) if name.isupper() and name != "COUNT")
+OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}
 FIELDS = tuple(name for name, *_ in plant.FIELDS)
 
 
 def check(text: str, source: str) -> None:
     """Raise AirTouchError for a signal, plant field or parameter that there is not, and for a place outside its array.
 
-    It reads `file:line: ...; did you mean ...`.
+    It reads `file:line: ...; did you mean ...`. Checked are places that numbers, whole-number constants of the file
+    and signals give, also their sums, differences and products; one that is computed in flight is not.
     """
     tree = ast.parse(text, source)
     known = set(_signal_modules(tree))
@@ -35,20 +38,71 @@ def check(text: str, source: str) -> None:
                 _check(node.slice.value, (*FIELDS, "firmware"), "plant field", source, node.lineno)
             elif node.value.id == values and parameters:
                 _check(node.slice.value, parameters, "parameter of this file", source, node.lineno)
+    numbers = dict(_whole_numbers(tree))
     for function in _wrenches(tree):
-        _check_places(function, len(parameters), source)
+        _check_places(function, len(parameters), numbers, known, source)
 
 
-def _check_places(function: ast.FunctionDef, parameters: int, source: str) -> None:
-    """Raise AirTouchError where a wrench names a place that its array lacks: compiled code does not look."""
-    values, _, memory, _, out = (a.arg for a in function.args.args)
-    places = {values: parameters or PARAMETERS, memory: MEMORY, out: 6}
+def _check_places(function: ast.FunctionDef, parameters: int, numbers: Mapping[str, int], known: set[str],
+                  source: str) -> None:
+    """Raise AirTouchError where a wrench names a place that its array lacks: compiled code does not look.
+
+    numbers: the file's whole-number constants. known: names of the module of signals.
+    """
+    values, seen, memory, _, out = (a.arg for a in function.args.args)
+    places = {values: parameters or PARAMETERS, seen: signals.COUNT, memory: MEMORY, out: 6}
+    own = {node.id for node in ast.walk(function) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    constants = {name: value for name, value in numbers.items() if name not in own}
     for node in ast.walk(function):
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id in places:
-            last = places[node.value.id] - 1
-            if isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, int) and node.slice.value > last:
-                raise AirTouchError(f"{source}:{node.lineno}: {node.value.id}[{node.slice.value}] does not exist; "
-                                    f"the last place is {node.value.id}[{last}]")
+            name, size = node.value.id, places[node.value.id]
+            place = _value(node.slice, constants, known)
+            if place is not None and not (0 if name == values else -size) <= place < size:  # p is longer than it seems
+                raise AirTouchError(f"{source}:{node.lineno}: {ast.unparse(node)} does not exist; "
+                                    f"the last place is {name}[{size - 1}]")
+
+
+def _value(node: ast.AST, constants: Mapping[str, int], known: set[str]) -> int | None:
+    """The whole number that an expression gives before the flight; None if there is none."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, int) else None
+    if isinstance(node, ast.Name):
+        return constants.get(node.id)
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in known:
+        return getattr(signals, node.attr, None)
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        value = _value(node.operand, constants, known)
+        return None if value is None else -value
+    if isinstance(node, ast.BinOp) and type(node.op) in OPERATIONS:
+        left, right = _value(node.left, constants, known), _value(node.right, constants, known)
+        return None if left is None or right is None else OPERATIONS[type(node.op)](left, right)
+    return None
+
+
+def _whole_numbers(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """Names and values of the file's whole-number constants: `A = 3` and `A, B = 0, 1` or `A, B = range(2)`."""
+    for node in tree.body:
+        if not isinstance(node, ast.Assign):
+            continue
+        for target in node.targets:
+            names, values = [target], [node.value]
+            if isinstance(target, ast.Tuple):
+                names = target.elts
+                values = node.value.elts if isinstance(node.value, ast.Tuple) else _range(node.value)
+            for name, value in zip(names, values, strict=False):
+                number = _value(value, {}, set())
+                if isinstance(name, ast.Name) and number is not None:
+                    yield name.id, number
+
+
+def _range(node: ast.expr) -> list[ast.expr]:
+    """The elements of `range(stop)` and `range(start, stop)`; none of anything else."""
+    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range"):
+        return []
+    bounds = [_value(argument, {}, set()) for argument in node.args]
+    if not 1 <= len(bounds) <= 2 or None in bounds:
+        return []
+    return [ast.Constant(i) for i in range(*(b for b in bounds if b is not None))]
 
 
 def _wrenches(tree: ast.Module) -> Iterator[ast.FunctionDef]:

@@ -20,6 +20,8 @@ from airtouch.sitl.services.toc import Item
 
 G = 9.81
 INVALID_RANGE_MM = 32767
+RESET_ESTIMATE = "kalman.resetEstimation"  #: writing 1 resets the estimate; the firmware then clears it
+INITIAL = ("kalman.initialX", "kalman.initialY", "kalman.initialZ", "kalman.initialYaw")  #: m and rad after a reset
 START_OVER = "sitl.startOver"  #: parameter that only the virtual drone has: writing 1 puts it back to its start
 GYRO_LSB_DEG = 2000.0 * 2.0 / 65536.0
 Read = Callable[[Drone], float]
@@ -126,11 +128,8 @@ def parameters(drone: Drone, ai_deck: bool) -> list[Parameter]:
         Parameter("stabilizer.estimator", "uint8_t", 2, core=True),
         Parameter("stabilizer.controller", "uint8_t", 1, core=True),
         Parameter("stabilizer.stop", "uint8_t", 0, core=True),
-        Parameter("kalman.resetEstimation", "uint8_t", 0, core=True),
-        Parameter("kalman.initialX", "float", 0.0, core=True),
-        Parameter("kalman.initialY", "float", 0.0, core=True),
-        Parameter("kalman.initialZ", "float", 0.0, core=True),
-        Parameter("kalman.initialYaw", "float", 0.0, core=True),
+        Parameter(RESET_ESTIMATE, "uint8_t", 0, core=True),
+        *(Parameter(name, "float", 0.0, core=True) for name in INITIAL),
         Parameter("pm.lowVoltage", "float", 3.2, persistent=True, core=True),
         Parameter("pm.criticalLowVoltage", "float", 3.0, persistent=True, core=True),
         Parameter("system.selftestPassed", "int8_t", 1, read_only=True),

@@ -14,13 +14,12 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.simulation import effects as registry
+from airtouch.twin.recorded.channels import ROTOR_SIGNS
 from airtouch.twin.recorded.near_range import NearRange
 from airtouch.vehicle import Vehicle
 
 #: `Lever.of` of a vehicle's field, and of an argument of `missions.course_values`
 VEHICLE, MISSION = "vehicle", "mission"
-#: signs of rotors 1 to 4 in each direction of trim
-ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 TRIM_UNIT = "thrust loss"  #: unit of a trim: fraction of a rotor's thrust
 #: kg m², of a Crazyflie's rotor and propeller: `python tools/calibration/rotor_inertia.py
 #: ../shared/flights/imrclab/brushed_jana04.csv.gz` prints 4.1e-8
@@ -40,9 +39,9 @@ class Lever:
     """A parameter of the simulator.
 
     of: an effect, "vehicle", "mission" or "trim". key: its parameter, a vehicle's field (with `.0` to `.2` for an
-    axis), or a direction of ROTOR_SIGNS. start, low, high, step and spread in `unit`. step: typical change in a round.
-    spread: half width of the range from which each flight draws it, None for one value in all flights. Names and
-    order of the fields are part of `fit.key`: a change makes stored fits those of other settings.
+    axis), or a direction of `channels.ROTOR_SIGNS`. start, low, high, step and spread in `unit`. step: typical change
+    in a round. spread: half width of the range from which each flight draws it, None for one value in all flights.
+    Names and order of the fields are part of `fit.key`: a change makes stored fits those of other settings.
     """
 
     of: str

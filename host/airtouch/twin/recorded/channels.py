@@ -23,8 +23,10 @@ GRAVITY = 9.81  #: m/s²
 LAG_S, DELAY = 0.06, 2  #: first-order lag (s) and delay (samples) of thrust, as in `reference.motion_channels`
 #: percentile of the lagged thrust, and fraction of it from which the drone flies; no source: round numbers
 FLIGHT_PERCENTILE, FLIGHT_FRACTION = 90, 0.5
+#: signs of motors 1 to 4 in a roll, pitch (nose up) and yaw command, as `simulation.firmware.mixer` mixes them
+ROTOR_SIGNS = {"roll": (-1, -1, 1, 1), "pitch": (1, -1, -1, 1), "yaw": (1, -1, 1, -1)}
 #: motors 1 to 4 to roll, pitch, yaw and mean
-MIX = np.array([[-1, -1, 1, 1], [1, -1, -1, 1], [1, -1, 1, -1], [0.25, 0.25, 0.25, 0.25]])
+MIX = np.array([*ROTOR_SIGNS.values(), (0.25, 0.25, 0.25, 0.25)])
 
 
 def channels(log: FlightLog) -> np.ndarray:

@@ -12,8 +12,8 @@ from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.reference.finite import hold_finite
 from airtouch.robust import deviation
+from airtouch.twin.recorded.channels import ROTOR_SIGNS
 
-PITCH = np.array([1.0, -1.0, -1.0, 1.0])  #: sign of motors 1 to 4 in the pitch command
 PERIODS_S = np.arange(0.30, 1.0, 0.002)  #: s, periods that are tried; the authors' is 0.52 s
 MIN_PULSES = 4  #: periods that a hover must hold; no source: least for a scatter
 #: standard errors of the mean jump; of the authors' flights (folds 0 to 2) those with pulses have 7.5 or more, all at
@@ -27,7 +27,7 @@ def period(log: FlightLog, start: int, stop: int) -> float:
     """Period in s of the pulses between two samples of a 100 Hz log; 0 without pulses."""
     if stop - start < MIN_PULSES * PERIODS_S[0] * SAMPLE_RATE_HZ:
         return 0.0
-    jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ PITCH)
+    jumps = np.diff(hold_finite(log.stack(PWM)[start:stop])[0] @ np.array(ROTOR_SIGNS["pitch"], dtype=float))
     size = deviation(jumps)
     if size <= 0.0:
         return 0.0

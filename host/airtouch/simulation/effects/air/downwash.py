@@ -50,7 +50,7 @@ EFFECT = Effect(
                "distance at which the push is 1/e of that on the axis; 0: everywhere",
                "Crazyflies: 3 % of the weight 0.15 to 0.25 m aside"),
      Parameter("turbulence", "1", 0.3, 0.0, 5.0, 0.0, "rms of a rotor's push over its mean"),
-     Parameter("turbulence_time", "s", 0.02, 0.002, 1.0, None, "its correlation time",
+     Parameter("turbulence_time", "s", 0.02, 0.002, 1.0, None, "correlation time of the turbulence",
                "roll and pitch of Crazyflies under others, neural-swarm: falls off from 8 Hz"),
      Parameter("swirl", "m", 0.01, 0.0, 0.2, None, "unsteady yaw torque over unsteady push of a rotor",
                "Crazyflies under others, neural-swarm: yaw over roll and pitch at 12 to 18 Hz")),

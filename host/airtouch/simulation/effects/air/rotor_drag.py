@@ -17,8 +17,8 @@ def rotor_drag(p, s, memory, generator, out):
 
 EFFECT = Effect(
     "rotor_drag", "drag of the rotors, linear in speed over ground and in rotor speed",
-    (Parameter("horizontal", "N s/m", 0.0147, 0.0, 2.0, 0.0, "in the disc plane, at hover",
+    (Parameter("horizontal", "N s/m", 0.0147, 0.0, 2.0, 0.0, "drag in the disc plane, at hover",
                "drone-models 0.0147; Foerster 2015 0.0056"),
-     Parameter("vertical", "N s/m", 0.0, 0.0, 2.0, 0.0, "along the rotor axis, at hover",
+     Parameter("vertical", "N s/m", 0.0, 0.0, 2.0, 0.0, "drag along the rotor axis, at hover",
                "Foerster 2015: about 0.01")),
     wrench=rotor_drag)

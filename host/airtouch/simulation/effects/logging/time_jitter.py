@@ -10,9 +10,9 @@ def settings(plant, v):
 
 EFFECT = Effect(
     "time_jitter", "random error of the logged time",
-    (Parameter("rms", "s", 0.003, 0.0, 0.2, 0.0, "independent from sample to sample",
+    (Parameter("rms", "s", 0.003, 0.0, 0.2, 0.0, "error of the logged time, independent from sample to sample",
                "host arrival times: bursts up to 350 ms"),
      Parameter("behind", "s", 0.004, 0.0, 0.01, None,
-               "of a row behind the last run of position controller and prediction, whole 2 ms",
+               "time of a logged row after the last run of position controller and prediction, whole 2 ms",
                "authors' flights: the 2 ms kick of a set-point step is in the log in some flights only")),
-    settings=settings)
+    settings=settings, once=True)

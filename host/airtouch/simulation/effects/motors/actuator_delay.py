@@ -9,6 +9,6 @@ def settings(plant, v):
 
 EFFECT = Effect(
     "actuator_delay", "delay from command to motor",
-    (Parameter("delay", "s", 0.008, 0.0, 0.1, 0.0, "the logged command leads the thrust by it",
+    (Parameter("delay", "s", 0.008, 0.0, 0.1, 0.0, "time by which the logged command leads the thrust",
                "authors' flights: 20 ms"),),
     settings=settings)

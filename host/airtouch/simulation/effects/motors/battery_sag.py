@@ -14,7 +14,7 @@ EFFECT = Effect(
     "battery_sag", "supply voltage falls with load and charge; thrust with its square",
     (Parameter("strength", "1", 1.0, 0.0, 3.0, 0.0, "1: the vehicle's battery, 0: always the nominal voltage",
                "authors' flights: PWM +70 a second"),
-     Parameter("charge", "1", 0.8, 0.05, 1.0, None, "at take-off"),
+     Parameter("charge", "1", 0.8, 0.05, 1.0, None, "charge at take-off, fraction of the capacity"),
      Parameter("resistance", "1", 1.0, 0.0, 10.0, None, "times the declared internal resistance"),
      Parameter("capacity", "1", 1.0, 0.1, 10.0, None, "times the declared capacity")),
-    settings=settings)
+    settings=settings, once=True)

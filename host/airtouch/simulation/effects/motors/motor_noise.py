@@ -17,7 +17,7 @@ EFFECT = Effect(
     "motor_noise", "random thrust of each rotor",
     (Parameter("rms", "1", 0.02, 0.0, 0.5, 0.0, "rms over mean thrust, each rotor",
                "authors' flights: disturbance force noise 0.5 to 0.7 % of weight"),
-     Parameter("time", "s", 0.02, 0.002, 2.0, None, "correlation time", "guess"),
-     Parameter("fast", "1", 0.0, 0.0, 0.5, 0.0, "rms of a second, faster part"),
-     Parameter("fast_time", "s", 0.01, 0.002, 2.0, None, "its correlation time")),
+     Parameter("time", "s", 0.02, 0.002, 2.0, None, "correlation time of the noise `rms`", "guess"),
+     Parameter("fast", "1", 0.0, 0.0, 0.5, 0.0, "rms over mean thrust of a second, faster part, each rotor"),
+     Parameter("fast_time", "s", 0.01, 0.002, 2.0, None, "correlation time of the faster part")),
     settings=settings)

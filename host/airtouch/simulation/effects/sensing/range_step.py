@@ -17,4 +17,4 @@ EFFECT = Effect(
                "authors' flights: a thrust kick four samples after nearly every edge"),
      Parameter("mixed", "1", 0.0, 0.0, 1.0, 0.0, "fraction of edges whose one reading in passing mixes both surfaces",
                "authors' flights: nearly every edge")),
-    settings=settings)
+    settings=settings, once=True)

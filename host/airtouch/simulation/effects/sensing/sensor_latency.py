@@ -9,5 +9,6 @@ def settings(plant, v):
 
 EFFECT = Effect(
     "sensor_latency", "delay from the IMU to the controller",
-    (Parameter("delay", "s", 0.005, 0.0, 0.1, 0.0, "any length, whole steps or not", "firmware: 1 to 2 ms"),),
+    (Parameter("delay", "s", 0.005, 0.0, 0.1, 0.0,
+               "delay from the IMU to the controller, whole steps or not", "firmware: 1 to 2 ms"),),
     settings=settings)

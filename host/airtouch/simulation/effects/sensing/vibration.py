@@ -11,8 +11,8 @@ def settings(plant, v):
 EFFECT = Effect(
     "vibration", "the rotors' 1/rev lines on the IMU, folded by the log rate",
     (Parameter("amplitude", "m/s^2", 1.0, 0.0, 30.0, 0.0,
-               "of the accelerometer line in hover, four rotors together",
+               "amplitude of the accelerometer's line in hover, four rotors together",
                "out-of-balance propellers; none clear below 50 Hz in the authors' flights"),
      Parameter("gyro", "rad/m", 0.05, 0.0, 1.0, None,
                "gyro amplitude (rad/s) over the accelerometer's (m/s^2)")),
-    settings=settings)
+    settings=settings, once=True)
