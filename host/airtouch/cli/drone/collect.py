@@ -89,8 +89,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
     if flights < 1:
         raise AirTouchError("--flights must be 1 or more")
-    first = mission.load(mission_name, seed, number or 0)
-    name = name or Path(first.name).name
+    name = name or Path(mission.scene_of(mission_name).name).name
     plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
                         link_timeout, force)
     with no_empty_folders(out):
@@ -99,8 +98,8 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         numbers = range(first_number, first_number + flights)
         for i in numbers:
             check_free(recorder.flight_path(out, name, i), force)
-        click.echo(first.describe())
         missions = {i: mission.load(mission_name, seed, i) for i in numbers}
+        click.echo(mission.describe_all(list(missions.values())))
         planned = _fly(plan, missions, cache, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
 
@@ -131,6 +130,7 @@ def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | Non
             raise click.Abort
         ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
         for number, mission in missions.items():
+            click.echo(f"flight {number}: {mission.describe()}")
             if ask:
                 click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
             with _display(mission.seconds) as show, stopping() as stop:
