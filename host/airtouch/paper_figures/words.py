@@ -8,7 +8,7 @@ from airtouch.paper_figures.figure import Verdict
 
 MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
 #: Margins within which the 95 % interval of a difference must lie for "the same" or "reached". No source: chosen.
-ERROR_MARGIN = 0.25  #: of a mean error, as a fraction of it
+ERROR_MARGIN = 0.25  #: of a mean error or a power, as a fraction of it
 SHARE_MARGIN = 0.10  #: of a share: of edges missed, of edges within a distance
 
 
