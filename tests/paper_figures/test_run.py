@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from airtouch.cli.paper import command
 from airtouch.errors import AirTouchError
-from airtouch.paper_figures import run
+from airtouch.paper_figures import run, words
 from airtouch.paper_figures.claims import REPRODUCED, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
@@ -23,7 +23,8 @@ def figures(monkeypatch):
 
     def works(job):
         calls.append(job.quick)
-        verdicts = {name: Verdict(REPRODUCED, f"n = {len(calls)} <of 3>") for name in ("height-4cm", "height-9cm")}
+        verdicts = {name: Verdict(REPRODUCED, f"n = {len(calls)} <of 3>", "best alone")
+                    for name in ("height-4cm", "height-9cm")}
         return Figure("Works", [{"what": "a", "value": 1.5}, {"what": "b", "n": 2}], "Simulated.", verdicts,
                       lambda canvas: canvas.subplots().plot([1, 2]))
 
@@ -52,6 +53,14 @@ def test_what_is_missing_is_said_and_the_others_are_made(figures, tmp_path):
     assert {c["verdict"] for name in ("fig8e", "table1") for c in verdicts[name]["claims"].values()} == {UNTESTABLE}
     page = (out / "index.html").read_text()
     assert "n = 1 &lt;of 3&gt;" in page and "Not made: no recorded flights" in page and "0.364" not in page
+
+
+def test_the_page_says_what_is_judged_and_by_which_margins(figures, tmp_path, monkeypatch):
+    monkeypatch.setattr(words, "ERROR_MARGIN", 0.4)
+    run.run(["fig8d", "fig8e"], tmp_path, Job(None, tmp_path / "work"))
+    page = (tmp_path / "index.html").read_text()
+    assert "at most 40 % above the paper" in page
+    assert page.count("of best alone") == 2  # the two verdicts, and not those that could not be tested
 
 
 def test_done_figures_stay_and_damaged_ones_are_made_again(figures, tmp_path):

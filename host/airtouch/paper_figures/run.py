@@ -125,7 +125,7 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     if set(figure.verdicts) != set(verdicts):
         raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(verdicts)}")
     for claim, verdict in figure.verdicts.items():
-        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.evidence}
+        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.evidence, "judged": verdict.judged}
     png, svg = pictures.render(figure.draw)
     table = table_csv(figure.rows)
     for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):

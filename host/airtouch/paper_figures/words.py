@@ -87,9 +87,9 @@ def inverse(answer: bool | None) -> bool | None:
     return None if answer is None else not answer
 
 
-def verdict(answer: bool | None, evidence: str) -> Verdict:
+def verdict(answer: bool | None, evidence: str, judged: str = Verdict.judged) -> Verdict:
     """The verdict "reproduced", "not reproduced", or for None "undecided", with the figures behind it."""
-    return Verdict(UNDECIDED if answer is None else REPRODUCED if answer else NOT_REPRODUCED, evidence)
+    return Verdict(UNDECIDED if answer is None else REPRODUCED if answer else NOT_REPRODUCED, evidence, judged)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:

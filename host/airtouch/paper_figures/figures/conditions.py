@@ -9,6 +9,7 @@ from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
 DETECTORS = ("best", "paper")
+BOTH = "the paper's method and best, each"  #: what some verdicts are on
 HEIGHTS = ("paper-4cm", "paper-9cm", "paper-12cm")
 WINDS_MPS = CLAIMS["wind"].values
 #: (detector, height, "simulated" or "recorded") -> scores of its flights
@@ -109,7 +110,7 @@ def by_angle(job: Job) -> Figure:
 
     both = "; ".join(text(name) for name in reversed(DETECTORS))
     verdicts = {"angle": words.verdict(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
-                "angle-sides": words.verdict(*_sides(rows))}
+                "angle-sides": words.verdict(*_sides(rows), BOTH)}
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
                + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
 
@@ -157,7 +158,7 @@ def wind(job: Job) -> Figure:
     caption = (f"Simulated: {2 * count} flights a speed, 4 cm over the platform, half with wind from the front and "
                "half from the left; the shipped networks. The wind is steady, as the paper's. The recorded flights "
                "have one with a fan.")
-    verdict = words.verdict(words.all_of(same.values()), text)
+    verdict = words.verdict(words.all_of(same.values()), text, BOTH)
     if calm["paper"]["missed"] is not None and calm["paper"]["missed"] > 0.5 and same["best"] is not False:
         verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {text}")
 

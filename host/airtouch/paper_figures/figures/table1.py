@@ -38,7 +38,8 @@ def measured_power(log: Path) -> Figure:
     of_paper = sum(stages.PAPER_MW.values()) - stages.PAPER_MW["baseline"]
     same = words.all_of([_same(total.mw, total.half_mw, CLAIMS["power"].values[0]), _same(*added, of_paper)])
     verdicts = {"power": words.verdict(same, f"total {_interval(total.mw, total.half_mw)}, of which "
-                                             f"{_interval(*added)} for AirTouch, over {total.seconds:.0f} s"),
+                                             f"{_interval(*added)} for AirTouch, over {total.seconds:.0f} s",
+                                      "the paper's stages"),
                 "negligible": _negligible(*added, "measured")}
     caption = (f"Measured with an INA219: {log.name}; 95 % intervals from blocks of 1 s."
                + (f" Left out, stages that the paper does not have: {', '.join(others)}." if others else ""))
@@ -88,7 +89,7 @@ def _negligible(mw: float, half_mw: float, source: str) -> Verdict:
     answer = words.decided(0.0 <= high < NEGLIGIBLE * propellers, low >= NEGLIGIBLE * propellers)
     return words.verdict(answer,
                          f"{source} {mw:.1f} mW are {100 * mw / propellers:.1f} % of the paper's 3000 mW; the paper's "
-                         "own 43 mW are 1.4 %. The propellers' power was not measured here")
+                         "own 43 mW are 1.4 %. The propellers' power was not measured here", "the paper's stages")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:

@@ -64,10 +64,10 @@ def _light_verdicts(rows: ByLight, ours: Summaries, lux: Sequence[float]) -> dic
         "light-bright": words.verdict(
             words.all_of([words.worse(rows["teed", bright], ours["best"]),
                           words.reaches(rows["teed", bright], bright_m)]),
-            f"{text(bright)}; best {best}"),
+            f"{text(bright)}; best {best}", "the camera (TEED's structure) against best"),
         "light-dark": words.verdict(words.all_of(words.worse(ours["best"], rows["teed", v]) for v in dark),
                                     "; ".join(text(v) for v in dark) + f"; best {best}. "
-                                    + _crossing(rows, ours["best"], lux))}
+                                    + _crossing(rows, ours["best"], lux), "the camera (TEED's structure) against best")}
 
 
 def _draw_light(canvas: Any, rows: ByLight, ours: Summaries, lux: Sequence[float]) -> None:
@@ -102,7 +102,7 @@ def network_size(job: Job) -> Figure:
     by_bytes, airtouch = _airtouch_sizes(job)
     table += [words.table_row(f"best, {size:,} bytes, recorded flights", r, parameters=size)
               for size, r in by_bytes.items()]
-    verdicts = {"network-vision": words.verdict(words.worse(full, least), f"at 100 lux {text}"),
+    verdicts = {"network-vision": words.verdict(words.worse(full, least), f"at 100 lux {text}", "the camera"),
                 "network-airtouch": airtouch}
 
     def draw(canvas):
@@ -137,7 +137,7 @@ def _airtouch_sizes(job: Job) -> tuple[dict[int, dict[str, Any]], Verdict]:
         return {}, Verdict(UNTESTABLE, str(missing))
     text = "; ".join(f"{size:,} bytes {words.metres(r)}, {words.misses(r)}" for size, r in rows.items())
     small, large = rows.values()
-    return rows, words.verdict(words.inverse(words.worse(large, small)), f"best on recorded flights: {text}")
+    return rows, words.verdict(words.inverse(words.worse(large, small)), f"best on recorded flights: {text}", "best")
 
 
 def fusion(job: Job) -> Figure:
@@ -157,7 +157,8 @@ def fusion(job: Job) -> Figure:
     text = "; ".join(f"{v:g} lux: camera {scores['camera', v]:.3f}, AirTouch {scores['AirTouch', v]:.3f}, both "
                      f"{scores['both', v]:.3f}" for v in lux_of(job))
     never_worse, outcome = _outcome([r for r in table if r["detector"] == "both"])
-    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in data.films)} edges: {text}; {outcome}")
+    verdict = words.verdict(never_worse, f"timed F1, {sum(len(f.edges) for f in data.films)} edges: {text}; {outcome}",
+                            "best and the camera together")
 
     def draw(canvas):
         axes = canvas.subplots()
