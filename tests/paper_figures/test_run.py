@@ -63,6 +63,15 @@ def test_the_page_says_what_is_judged_and_by_which_margins(figures, tmp_path, mo
     assert page.count("of best alone") == 2  # the two verdicts, and not those that could not be tested
 
 
+def test_each_figure_keeps_the_command_that_made_it(figures, tmp_path):
+    first, second = "airtouch paper --flights 'my flights'", "airtouch paper --only fig8e --power-log run.csv"
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"), command=first)
+    run.run(["fig8d", "fig8e"], tmp_path, Job(None, tmp_path / "work"), command=second)
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("my flights") < page.index('<section id="fig8e">') < page.index(second)
+    assert json.loads((tmp_path / "fig8d.json").read_text())["command"] == first
+
+
 def test_done_figures_stay_and_damaged_ones_are_made_again(figures, tmp_path):
     job = Job(None, tmp_path / "work")
     run.run(["fig8d"], tmp_path, job)

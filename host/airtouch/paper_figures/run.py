@@ -54,7 +54,7 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     Returns the records: name -> record. A figure with the same settings is not made again. A figure with missing or bad
     input has the reason in its record ("missing"), and the others are made. workers: processes; `job.tell` must then be
     a function that can be pickled. Raises AirTouchError, before any work, if `out` holds a figure with other settings,
-    without `force`; and if a process dies.
+    without `force`; and if a process dies. command: as it was typed, for the records of the figures that are made.
     """
     key = settings_key(job)
     old = {name: record(out, name) for name in chosen}
@@ -73,7 +73,7 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     else:
         _make_in_processes(groups, job, out, key, command, workers)
     all_records = records(out)
-    page.write(out, all_records, command)
+    page.write(out, all_records)
     return all_records
 
 
@@ -84,9 +84,10 @@ def make_all(chosen: Sequence[str], job: Job, out: Path, key: str, command: str)
         job.tell(f"{name} ...")
         entry = make(name, job, out)
         entry |= {"key": key, "seconds": round(time.monotonic() - started, 1),
-                  "cpu_seconds": round(time.process_time() - cpu_before, 1), "quick": job.quick}
+                  "cpu_seconds": round(time.process_time() - cpu_before, 1), "quick": job.quick, "command": command,
+                  "version": __version__}
         write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
-        page.write(out, records(out), command)
+        page.write(out, records(out))
         job.tell(f"{name}: {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s ({entry['cpu_seconds']:.0f} s "
                  "of processor time)")
 
