@@ -93,6 +93,24 @@ def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
     assert figures == [False, True] and json.loads((tmp_path / "fig8d.json").read_text())["quick"]
 
 
+def test_a_figure_is_stale_by_what_it_reads_alone(figures, tmp_path):
+    flights, air = tmp_path / "data" / "flights", tmp_path / "data" / "imrclab"
+    for folder in (flights, air):
+        folder.mkdir(parents=True)
+        (folder / "a.csv").write_text("t_s\n0\n")
+    log = tmp_path / "run.csv"
+    log.write_text("time_ms\n")
+    job = Job(flights, tmp_path / "work")
+    run.run(["fig8d"], tmp_path, job)
+    run.run(["fig8d"], tmp_path, Job(flights, tmp_path / "work", power_log=log))
+    assert len(figures) == 1  # no power is in it
+    assert run.settings_key(job, "table1") != run.settings_key(Job(flights, tmp_path, power_log=log), "table1")
+    assert run.settings_key(job, "wind") == run.settings_key(Job(None, tmp_path), "wind")
+    (air / "b.csv").write_text("t_s\n0\n")  # `best` is trained on it too
+    with pytest.raises(AirTouchError, match="fig8d.csv was made with other settings"):
+        run.run(["fig8d"], tmp_path, job)
+
+
 def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tmp_path, monkeypatch):
     monkeypatch.setattr("airtouch.cli.paper.find_flights", lambda: None)
     # one worker: a process of its own would make the real figures, not these
