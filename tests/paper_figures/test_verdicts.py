@@ -146,6 +146,17 @@ def test_a_caption_names_the_flights_that_are_missing(tmp_path):
     assert sentence.endswith("; and 2 more.") and "f3.csv" not in sentence
 
 
+def test_flights_without_free_air_beside_them_are_scored(tmp_path, monkeypatch):
+    settings = []
+    flight = SimpleNamespace(path="f", condition=SimpleNamespace(fold=0))
+    monkeypatch.setattr(recorded, "files", lambda _: [flight])
+    monkeypatch.setattr(recorded.crossval, "crossval", lambda *arguments, **_: settings.append(arguments[3]) or
+                        SimpleNamespace(scores=[], folds=[]))
+    (tmp_path / "flights").mkdir()
+    recorded.scores(Job(tmp_path / "flights", tmp_path / "work"), "best")
+    assert settings[0].free_air == []
+
+
 def test_a_quick_run_takes_fewer_flights_and_all_folds(tmp_path, monkeypatch):
     collection = [SimpleNamespace(path=f"f{i}", condition=SimpleNamespace(fold=i % 5)) for i in range(90)]
     monkeypatch.setattr(recorded.dataset, "collect", lambda _: collection)
