@@ -96,6 +96,16 @@ def test_errors_by_angle_are_judged_by_their_trend_and_by_side(job, monkeypatch,
     assert (verdict(figure, "angle"), verdict(figure, "angle-sides")) == (trend, sides)
 
 
+def test_flights_by_angle_are_the_low_ones_of_a_known_angle(job, monkeypatch):
+    scores = [s for angle in (0.0, 20.0) for s in flights(0.02, height="low", angle_deg=angle, count=3)]
+    scores += [*flights(0.5, height="low", count=50), *flights(0.5, height="high", angle_deg=0.0, count=70)]
+    monkeypatch.setattr(recorded, "scores", lambda _, name: (scores, folds()))
+    monkeypatch.setattr(recorded, "sample_sentence", lambda _, count, edges: f"{count} flights, {edges} edges")
+    figure = conditions.by_angle(job)
+    assert figure.caption.endswith("6 flights, 12 edges")
+    assert "0° 0.020 m" in figure.verdicts["angle"].evidence and "of 6 missed" in figure.verdicts["angle"].evidence
+
+
 @pytest.mark.parametrize(("calm", "windy", "answer"), [((0.03, 0.0), (0.03, 0.0), REPRODUCED),
                                                        ((0.03, 0.0), (0.09, 0.0), NOT_REPRODUCED),
                                                        ((0.03, 0.0), (0.03, 0.5), NOT_REPRODUCED)])

@@ -98,7 +98,7 @@ def by_angle(job: Job) -> Figure:
                 rows[name, angle] = row = summary.summarise(group)
                 table.append(words.table_row(f"{name}, {angle:+.0f}°", row, detector=name, angle_deg=angle))
     groups = {name: {size: [s for s in flights if s.condition.height == "low"
-                            and abs(s.condition.angle_deg or 0.0) == size]
+                            and s.condition.angle_deg in (size, -size)]
                      for size in (0.0, 10.0, 20.0)}
               for name, flights in scores.items()}
     by_size = {name: {size: summary.summarise(group) for size, group in sizes.items()}
@@ -111,8 +111,9 @@ def by_angle(job: Job) -> Figure:
     both = "; ".join(text(name) for name in reversed(DETECTORS))
     verdicts = {"angle": words.verdict(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
                 "angle-sides": words.verdict(*_sides(rows), BOTH)}
+    counted = [s for group in groups["best"].values() for s in group]
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
-               + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
+               + recorded.sample_sentence(job, len(counted), sum(len(s.edges) for s in counted)))
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
