@@ -103,7 +103,7 @@ def test_flights_by_angle_are_the_low_ones_of_a_known_angle(job, monkeypatch):
     monkeypatch.setattr(recorded, "sample_sentence", lambda _, count, edges: f"{count} flights, {edges} edges")
     figure = conditions.by_angle(job)
     assert figure.caption.endswith("6 flights, 12 edges")
-    assert "0° 0.020 m" in figure.verdicts["angle"].evidence and "of 6 missed" in figure.verdicts["angle"].evidence
+    assert "0° 0.019 m" in figure.verdicts["angle"].evidence and "of 6 missed" in figure.verdicts["angle"].evidence
 
 
 @pytest.mark.parametrize(("calm", "windy", "answer"), [((0.03, 0.0), (0.03, 0.0), REPRODUCED),
@@ -158,8 +158,8 @@ def test_a_caption_names_the_flights_that_are_missing(tmp_path):
 
 def test_flights_without_free_air_beside_them_are_scored(tmp_path, monkeypatch):
     settings = []
-    flight = SimpleNamespace(path="f", condition=SimpleNamespace(fold=0))
-    monkeypatch.setattr(recorded, "files", lambda _: [flight])
+    two = [SimpleNamespace(path=f"f{fold}", condition=SimpleNamespace(fold=fold)) for fold in (0, 1)]
+    monkeypatch.setattr(recorded, "files", lambda _: two)
     monkeypatch.setattr(recorded.crossval, "crossval", lambda *arguments, **_: settings.append(arguments[3]) or
                         SimpleNamespace(scores=[], folds=[]))
     (tmp_path / "flights").mkdir()
