@@ -260,6 +260,7 @@ def test_size_of_the_networks(job, monkeypatch, small_m, answer):
     monkeypatch.setattr(recorded, "variant_scores", lambda _, name, __, options: (
         flights(0.02), folds(parameter_bytes=round(13000 * (1 - options["sparsity"])))))
     figure = vision.network_size(job)
+    assert {r["bytes"] for r in figure.rows[-2:]} == {1950, 13000} and "parameters" not in figure.rows[-1]
     assert verdict(figure, "network-vision") == answer and verdict(figure, "network-airtouch") == REPRODUCED
 
 
