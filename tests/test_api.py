@@ -115,6 +115,13 @@ def test_gap_is_called_by_name_and_stays_a_module(log, path, tmp_path):
         at.gap.diagnose(log.slice(0, 150))
 
 
+@pytest.mark.parametrize("without, words", [(["magic"], "no effect 'magic'"),
+                                            ("wind", r"a list of effects: \['wind'\]")])
+def test_effects_to_leave_out_are_checked(log, without, words):
+    with pytest.raises(AirTouchError, match=words):
+        at.gap.diagnose(log, without=without)
+
+
 def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
     of_unknown = log.with_columns({}, vehicle="my-drone")
     with pytest.warns(UserWarning, match="'my-drone', of which no file is known; crazyflie-2.1-flow is used, vehicle "
