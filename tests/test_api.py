@@ -122,6 +122,13 @@ def test_effects_to_leave_out_are_checked(log, without, words):
         at.gap.diagnose(log, without=without)
 
 
+def test_a_report_that_is_there_is_told_before_the_diagnosis(log, tmp_path, monkeypatch):
+    monkeypatch.setattr("airtouch.gap.diagnosis.diagnose", lambda *_, **__: pytest.fail("diagnosed first"))
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(AirTouchError, match="use force=True to replace it"):
+        at.gap.diagnose(log, report=tmp_path / "report.html")
+
+
 def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
     of_unknown = log.with_columns({}, vehicle="my-drone")
     with pytest.warns(UserWarning, match="'my-drone', of which no file is known; crazyflie-2.1-flow is used, vehicle "

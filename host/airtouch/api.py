@@ -182,8 +182,11 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
     import airtouch.gap.diagnosis as module
+    from airtouch.logs.files import check_free
     from airtouch.report import gap_report
 
+    if report is not None:
+        check_free(Path(report), force)
     logs = _logs(flights)
     diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), _logs(baseline), without=without,
                                 pictures=report is not None)
