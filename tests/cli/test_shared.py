@@ -1,7 +1,9 @@
-"""What commands and the scripts of tools share: a bar of how many items are done, the folder of recorded flights."""
+"""What commands and the scripts of tools share: a progress bar, the folder of recorded flights, options."""
 
+import click
 import pytest
 
+from airtouch.cli import airtouch
 from airtouch.cli.shared import flights
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError
@@ -27,3 +29,27 @@ def test_without_recorded_flights_it_says_what_to_do(monkeypatch):
     monkeypatch.setattr(flights, "_beside", lambda: None)
     with pytest.raises(AirTouchError, match="no recorded flights found; name their folder or set AIRTOUCH_FLIGHTS"):
         flights.need_flights()
+
+
+def options_of(command):
+    """(command's name, option) of every option of every command below."""
+    if isinstance(command, click.Group):
+        context = click.Context(command)
+        return [pair for name in command.list_commands(context)
+                for pair in options_of(command.get_command(context, name))]
+    return [(command.name, p) for p in command.params if isinstance(p, click.Option)]
+
+
+def taken(option, text):
+    try:
+        option.type.convert(text, option, None)
+    except click.BadParameter:
+        return False
+    return True
+
+
+def test_no_option_takes_a_number_that_is_not_finite():
+    """With a heading that is NaN, `map` wrote an empty map."""
+    numbers = [(name, o) for name, o in options_of(airtouch) if o.type.name.startswith("float")]
+    assert {"map", "sitl", "collect", "evaluate"} <= {name for name, _ in numbers}
+    assert [f"{name} {o.opts[0]} {text}" for name, o in numbers for text in ("nan", "inf") if taken(o, text)] == []

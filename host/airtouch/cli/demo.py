@@ -8,8 +8,9 @@ from typing import Any
 import click
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS, find_flights
+from airtouch.cli.shared.flights import find_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import SPEED_MPS
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import SPEED_MPS
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset

@@ -1,16 +1,16 @@
 """`airtouch collect`: fly a mission with a Crazyflie and write the flight logs."""
 
-import math
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from airtouch.cli.shared.options import Finite
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free, no_empty_folders
 from airtouch.vehicle import DEFAULT_VEHICLE
@@ -31,16 +31,6 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.exit()
 
 
-class _Limit(click.FloatRange):
-    """A finite number of a range: a limit that is NaN or infinite would never be reached."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
-        return number
-
-
 @click.command("collect")
 @click.option("--uri", help="Of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850.")
 @click.option("--mission", "mission_name",
@@ -55,9 +45,9 @@ class _Limit(click.FloatRange):
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Written into the log.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
               help="Set a parameter of the drone first.")
-@click.option("--min-battery", type=_Limit(min=0.0), default=3.7, show_default=True, metavar="V",
+@click.option("--min-battery", type=Finite(min=0.0), default=3.7, show_default=True, metavar="V",
               help="Least voltage on the ground.")
-@click.option("--link-timeout", type=_Limit(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
+@click.option("--link-timeout", type=Finite(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
 @click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
 @click.option("--cache", type=click.Path(path_type=Path),

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared import scores as table_of
+from airtouch.cli.shared.options import SPEED_MPS, Finite
 from airtouch.errors import AirTouchError
 from airtouch.parameters import SAMPLE_RATE_HZ
 
@@ -14,8 +15,8 @@ from airtouch.parameters import SAMPLE_RATE_HZ
 @click.command("replay")
 @click.argument("flight", type=click.Path(path_type=Path))
 @click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X",
-              type=click.FloatRange(0, 1000), help="Times real time; 1 is as it was flown.")
-@click.option("--flown-at", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
+              type=Finite(0, 1000), help="Times real time; 1 is as it was flown.")
+@click.option("--flown-at", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of a flight without one in manifest or log; needed for errors in metres.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained `best` model (.npz); the shipped one if left out.")

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared.options import SPEED_MPS
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError

@@ -9,8 +9,9 @@ import click
 from click.core import ParameterSource
 
 from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS, need_flights
+from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import SPEED_MPS
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
