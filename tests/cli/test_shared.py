@@ -53,3 +53,10 @@ def test_no_option_takes_a_number_that_is_not_finite():
     numbers = [(name, o) for name, o in options_of(airtouch) if o.type.name.startswith("float")]
     assert {"map", "sitl", "collect", "evaluate"} <= {name for name, _ in numbers}
     assert [f"{name} {o.opts[0]} {text}" for name, o in numbers for text in ("nan", "inf") if taken(o, text)] == []
+
+
+def test_no_seed_and_no_number_of_a_flight_is_negative():
+    """NumPy's generator takes none below 0: it was a traceback."""
+    drawn = [(name, o) for name, o in options_of(airtouch) if {"--seed", "--flight"} & {*o.opts}]
+    assert {"sitl", "collect", "crossval", "ablate", "simulate", "train"} <= {name for name, _ in drawn}
+    assert [name for name, o in drawn if taken(o, "-1") or not taken(o, "0")] == []

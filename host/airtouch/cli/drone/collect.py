@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from airtouch.cli.shared.options import Finite
+from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free, no_empty_folders
 from airtouch.vehicle import DEFAULT_VEHICLE
@@ -49,7 +49,7 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
               help="Least voltage on the ground.")
 @click.option("--link-timeout", type=Finite(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
-@click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
+@seed_option("For missions whose values are drawn.")
 @click.option("--cache", type=click.Path(path_type=Path),
               help="Folder for the drone's tables, to connect faster; ~/.cache/airtouch if left out.")
 @click.option("--yes", "-y", is_flag=True, help="Take off without asking.")

@@ -10,6 +10,7 @@ from airtouch.cli.gap.options import check_free, runner, written
 from airtouch.cli.gap.progress import Bar, Steps
 from airtouch.cli.shared import scores
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import seed_option
 from airtouch.logs.files import make_folder
 
 SEVERITIES_TAKE = "one to two minutes"  #: on two idle processors, 2026-11-26 (host/docs/gap-blind.md)
@@ -25,7 +26,7 @@ def blind() -> None:
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
               help="How many flights.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@seed_option("Of the whole set.")
 @click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Where the key goes; "
               "default: OUT.key.json beside OUT.")
 @click.option("--force", is_flag=True, help="Replace a set in OUT.")

@@ -9,6 +9,7 @@ from rich.table import Table
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import seed_option
 from airtouch.detector import ablation
 from airtouch.detector.ablation import ABLATIONS
 from airtouch.detector.evaluation.data import dataset
@@ -26,7 +27,7 @@ def _names() -> str:
               help="Run this one; may be given several times. All of them if left out.")
 @click.option("--steps", type=click.IntRange(1), help="Training steps of `best`; its own number if left out.")
 @click.option("--epochs", type=click.IntRange(1), help="Training epochs of `paper`; its own number if left out.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
+@seed_option("Of the training.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/ablate"), show_default=True,
               help="Folder for finished folds; a second run continues from it.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")

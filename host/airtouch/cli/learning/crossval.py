@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
-from airtouch.cli.shared.options import SPEED_MPS
+from airtouch.cli.shared.options import SPEED_MPS, seed_option
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -47,7 +47,7 @@ DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the fi
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
 @click.option("--speed", type=SPEED_MPS, metavar="M/S",
               help="Commanded speed of flights without one in their manifest.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
+@seed_option("Of the training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
 @click.option("--random-epochs", type=click.IntRange(1), default=60, show_default=True,

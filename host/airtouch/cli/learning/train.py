@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
-from airtouch.cli.shared.options import Finite
+from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
@@ -54,8 +54,7 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--scenario", metavar="NAME", help="With --simulated: what is flown; paper-mixed if left out.")
 @click.option("--without", multiple=True, metavar="EFFECT",
               help="With --simulated: an effect of the scenario to switch off; may be repeated.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
-              help="Fixes every bit of the result on one machine, simulated flights included.")
+@seed_option("Fixes every bit of the result on one machine, simulated flights included.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
             start: Path | None, labelled: int | None, silence: tuple[str, ...],

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.options import SPEED_MPS
+from airtouch.cli.shared.options import SPEED_MPS, seed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -31,7 +31,7 @@ SUMMARY, REPORT = "twin.json", "report.html"
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
 @click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
+@seed_option("Fixes the result.")
 @click.option("--workers", type=click.IntRange(1), help="Threads; default one a core.")
 @click.option("--resume", is_flag=True, help="Continue a fit that stopped.")
 @click.option("--force", is_flag=True, help="Replace the twin in --out.")

@@ -20,6 +20,6 @@ class Finite(click.FloatRange):
 SPEED_MPS = Finite(0, 100, min_open=True)  #: a commanded speed; no source: above any, in m/s
 
 
-def seed(text: str) -> Callable:
+def seed_option(text: str) -> Callable:
     """The option --seed, 0 if left out: NumPy takes none below 0. text: what it is the seed of."""
     return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=text)
