@@ -34,7 +34,7 @@ DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the fi
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
               help="Drop edges without an FR-CFAR alert.")
 @click.option("--epochs", type=click.IntRange(1),
-              help="Training epochs; the detector's own number if left out.")
+              help="paper: training epochs; its own number if left out.")
 @click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
 @click.option("--by", type=click.Choice(["fold", "day"]), default="fold", show_default=True,
               help="What is held out together: the manifest's folds, or whole days in five groups.")
@@ -81,6 +81,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
     if random_windows and detector != "paper":
         raise click.UsageError("--random-windows is for --detector paper, whose network it trains")
+    if detector == "best" and epochs:
+        raise click.UsageError("--epochs is for --detector paper and paper-stream; best takes --steps")
     if detector == "baseline" and epochs:
         raise click.UsageError("--epochs is for detectors with a network; the baseline has none")
     files = dataset.collect(flights or [need_flights()], speed)
