@@ -10,7 +10,7 @@ import click
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import find_flights
 from airtouch.cli.shared.help import examples
-from airtouch.cli.shared.options import SPEED_MPS
+from airtouch.cli.shared.options import speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
@@ -35,8 +35,7 @@ COMPILES = "the first time compiles the simulator, which takes a minute"
               help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
               help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest.")
+@speed_option
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
 def command(out: Path, flights: Path | None, speed: float | None, epochs: int, force: bool) -> None:

@@ -8,7 +8,7 @@ import click
 
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.help import examples
-from airtouch.cli.shared.options import SPEED_MPS
+from airtouch.cli.shared.options import speed_option
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -24,8 +24,7 @@ from airtouch.logs.files import check_free
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; default: the log's.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")

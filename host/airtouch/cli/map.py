@@ -19,7 +19,8 @@ from airtouch.logs.files import check_free, write_bytes
 @click.option("--model", type=click.Path(path_type=Path), help="Trained model (.npz); the shipped one if left out.")
 @click.option("--truth", is_flag=True, help="Map the true edges of the down range instead of the detector's.")
 @click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Speed for dead reckoning where the log has no position; the manifest's or the log's if left out.")
+              help="Commanded speed, before that of the manifest or the log: for dead reckoning where the log has no "
+                   "position.")
 @click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; the model's own if left out.")

@@ -22,7 +22,7 @@ STARTING = "starting; the first time compiles the simulator, which takes a minut
               help="UDP port; cflib scans 19850 to 19859. 0: any free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
 @click.option("--speed", type=Finite(0, 100, min_open=True), default=1.0, show_default=True,
-              help="Drone seconds a second.")
+              help="Drone seconds a second: the pace of the clock, not of the drone.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Name or .toml file.")
 @click.option("--effect", "chosen", multiple=True, metavar="NAME[:P=V...]",
               help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")

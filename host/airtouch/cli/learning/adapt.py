@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.options import SPEED_MPS, seed_option
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -28,8 +28,7 @@ MORE = 5  #: further flights whose benefit is estimated
               f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; else from the logs.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")

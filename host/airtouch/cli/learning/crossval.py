@@ -11,7 +11,7 @@ from click.core import ParameterSource
 from airtouch.cli.shared import scores as show
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
-from airtouch.cli.shared.options import SPEED_MPS, seed_option
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -45,8 +45,7 @@ DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the fi
 @click.option("--silence-training", is_flag=True, help="With --silence: remove it from the training flights too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest.")
+@speed_option
 @seed_option("Of the training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")

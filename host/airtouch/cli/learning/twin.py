@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.options import SPEED_MPS, seed_option
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -25,8 +25,7 @@ SUMMARY, REPORT = "twin.json", "report.html"
               help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True,
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; else from the logs.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
