@@ -115,7 +115,11 @@ def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tm
     monkeypatch.setattr("airtouch.cli.paper.find_flights", lambda: None)
     # one worker: a process of its own would make the real figures, not these
     result = CliRunner().invoke(command, ["--out", str(tmp_path), "--workers", "1"])
-    assert result.exit_code == 2 and "reproduced" in result.stdout and "Not made" not in result.stdout
+    lines = [line.split(maxsplit=1) for line in result.stdout.splitlines() if not line.startswith(" ")]
+    verdicts = [(name, rest) for name, rest in lines if name in ("fig8d", "fig8e", "table1")]
+    assert [name for name, rest in verdicts if rest.startswith(REPRODUCED)] == ["fig8d", "fig8d"]
+    assert [name for name, rest in verdicts if rest.startswith(UNTESTABLE)] == ["fig8e"] * 2 + ["table1"] * 2
+    assert result.exit_code == 2 and "Not made" not in result.stdout
     with pytest.raises(AirTouchError, match="no figure 'fig8x'; did you mean"):
         run.names(["fig8x"])
     missing = CliRunner().invoke(command, ["--flights", str(tmp_path / "none"), "--out", str(tmp_path)])
