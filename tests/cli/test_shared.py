@@ -2,6 +2,7 @@
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from airtouch.cli import airtouch
 from airtouch.cli.shared import flights
@@ -60,3 +61,11 @@ def test_no_seed_and_no_number_of_a_flight_is_negative():
     drawn = [(name, o) for name, o in options_of(airtouch) if {"--seed", "--flight"} & {*o.opts}]
     assert {"sitl", "collect", "crossval", "ablate", "simulate", "train"} <= {name for name, _ in drawn}
     assert [name for name, o in drawn if taken(o, "-1") or not taken(o, "0")] == []
+
+
+@pytest.mark.parametrize("arguments", [("simulate", "hover"), ("dataset", "fetch", "--from", ".")])
+def test_a_bar_is_no_part_of_the_answer(arguments, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(airtouch, [*arguments, "--out", "f"])
+    (line,) = result.stdout.splitlines()
+    assert line == "1 flight in f" or line.startswith("f: 0 new")

@@ -134,11 +134,13 @@ def _say_diverged(flights: Sequence[dict[str, Any]], record: Path) -> None:
 
 
 def _write(results, count: int, out: Path, name: str) -> None:
+    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from airtouch.simulation.workers import store
 
-    with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as bar:
+    with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+                  console=Console(stderr=True)) as bar:
         task = bar.add_task("flights", total=count)
         for result in results:
             if result is not None:
