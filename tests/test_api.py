@@ -74,6 +74,18 @@ def test_the_speed_of_a_simulated_flight_is_known(log):
     assert at.evaluate(log, "baseline")["per_flight"] == at.evaluate(log, "baseline", speed_mps=speed)["per_flight"]
 
 
+@pytest.mark.parametrize("speed", [float("nan"), float("inf"), 0.0, -0.3, 101.0, "0.3"])
+def test_a_speed_that_none_flies_is_refused(log, speed):
+    with pytest.raises(AirTouchError, match="speed_mps must be above 0 and at most 100 m/s, not"):
+        at.evaluate(log, "baseline", speed_mps=speed)
+
+
+@pytest.mark.parametrize("function", [at.evaluate, at.gap.diagnose, at.gap.measure])
+def test_nothing_is_no_flight(function):
+    with pytest.raises(AirTouchError, match="flights are file names, .* not NoneType"):
+        function(None)
+
+
 def test_messages_name_the_arguments_of_python_not_the_options_of_the_command_line(log, path, tmp_path):
     for write in (at.write, at.logs.write):
         with pytest.raises(at.AirTouchError, match=r"exists already; use force=True to replace it$"):
