@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.shared import scores as show
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.options import speed_option
 from airtouch.detector import registry
@@ -61,12 +61,12 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     _print_remarks(remarks)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
     result["remarks"] = remarks
-    screen = show.console()
+    screen = output.console()
     if scores:
-        show.print_table(screen, {detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off")
+        output.print_table(screen, {detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off")
         for what in ("height", "angle", "wind"):
             if len(result[f"by_{what}"]) > 1:
-                show.print_table(screen, result[f"by_{what}"], f"by {what}")
+                output.print_table(screen, result[f"by_{what}"], f"by {what}")
         for name in sorted({s.note for s in scores if s.note}):
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
@@ -74,9 +74,9 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
         screen.print(f"warning: the model was trained on {_which(trained_on, len(scores))}, so these figures do not "
                      "hold for other flights; airtouch crossval estimates those")
     if json_path:
-        show.write_json(json_path, result, force)
+        output.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
-    show.left_out(failures, len(scores))
+    output.left_out(failures, len(scores))
     if failures:
         sys.exit(2)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.shared import scores as table_of
+from airtouch.cli.shared import output
 from airtouch.cli.shared.options import SPEED_MPS, Finite
 from airtouch.errors import AirTouchError
 from airtouch.parameters import SAMPLE_RATE_HZ
@@ -62,7 +62,7 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
         click.echo("false: " + ", ".join(f"{s / SAMPLE_RATE_HZ:.2f} s" for s in result.score.false))
     figures = evaluate.as_json("best", [result.score], [], detector.lag_s, {})
     title = f"best: lag of {detector.lag_s:.2f} s taken off"
-    table_of.print_table(table_of.console(), {"best": figures}, title)
+    output.print_table(output.console(), {"best": figures}, title)
 
 
 def _in_words(edge) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import click
 from rich.table import Table
 
-from airtouch.cli.shared import scores as show
+from airtouch.cli.shared import output
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.options import seed_option
@@ -45,16 +45,16 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
         best_options={} if steps is None else {"steps": steps},
         paper_options={} if epochs is None else {"epochs": epochs},
         tell=lambda line: click.echo(line, err=True))
-    screen = show.console()
+    screen = output.console()
     for group in dict.fromkeys(row["group"] for row in results.values()):
         rows = {row["what"]: row for row in results.values() if row["group"] == group}
-        show.print_table(screen, rows, f"ablation: {group}")
+        output.print_table(screen, rows, f"ablation: {group}")
         if any("converged_after_epochs" in f["parameters"] for row in rows.values() for f in row["folds"]):
             screen.print(_training(rows))
         if any("parameter_bytes" in f["parameters"] for row in rows.values() for f in row["folds"]):
             screen.print(_sizes(rows))
     if json_path:
-        show.write_json(json_path, results, force)
+        output.write_json(json_path, results, force)
         screen.print(f"written: {json_path}")
 
 

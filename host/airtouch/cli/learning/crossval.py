@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from airtouch.cli.shared import scores as show
+from airtouch.cli.shared import output
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.options import seed_option, speed_option
@@ -102,8 +102,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     result["folds"] = [f.plain() for f in folds]
     if detector == "best":
         result["note"] = DECODER_NOTE
-    screen = show.console()
-    show.print_table(screen, {title: result, **result["by_height"]},
+    screen = output.console()
+    output.print_table(screen, {title: result, **result["by_height"]},
                      f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}")
     if "note" in result:
         screen.print(f"note: {result['note']}")
@@ -118,11 +118,11 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
                      f"after {leak['epochs']} epochs; "
                      f"by flight {result['balanced_accuracy']:.1%}")
     if json_path:
-        show.write_json(json_path, result, force)
+        output.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
     if ledger:
         note(ledger, title, result)
-    show.left_out(left_out, len(scores))
+    output.left_out(left_out, len(scores))
     if left_out:
         sys.exit(2)
 

@@ -63,7 +63,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch.twin.fitting import calibrate, levers
 
     fit_file = out / calibrate.FIT
-    _check_free(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
+    _check_results(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
     with no_empty_folders(out):
         make_folder(out)
         craft = vehicles.load(vehicle)
@@ -116,7 +116,7 @@ def _say(comparison: Any, flights: int, first_misfit: Any) -> None:
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
 
 
-def _check_free(fit_file: Path, results: Sequence[Path], resume: bool, force: bool) -> None:
+def _check_results(fit_file: Path, results: Sequence[Path], resume: bool, force: bool) -> None:
     """Raise AirTouchError for a twin, or files with the names of its results, without --force.
 
     A fit that goes on replaces its own results.
