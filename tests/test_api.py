@@ -74,6 +74,18 @@ def test_the_speed_of_a_simulated_flight_is_known(log):
     assert at.evaluate(log, "baseline")["per_flight"] == at.evaluate(log, "baseline", speed_mps=speed)["per_flight"]
 
 
+@pytest.mark.parametrize("speed", [float("nan"), float("inf"), 0.0, -0.3, 101.0, "0.3"])
+def test_a_speed_that_none_flies_is_refused(log, speed):
+    with pytest.raises(AirTouchError, match="speed_mps must be above 0 and at most 100 m/s, not"):
+        at.evaluate(log, "baseline", speed_mps=speed)
+
+
+@pytest.mark.parametrize("function", [at.evaluate, at.gap.diagnose, at.gap.measure])
+def test_nothing_is_no_flight(function):
+    with pytest.raises(AirTouchError, match="flights are file names, .* not NoneType"):
+        function(None)
+
+
 def test_messages_name_the_arguments_of_python_not_the_options_of_the_command_line(log, path, tmp_path):
     for write in (at.write, at.logs.write):
         with pytest.raises(at.AirTouchError, match=r"exists already; use force=True to replace it$"):
@@ -113,6 +125,20 @@ def test_gap_is_called_by_name_and_stays_a_module(log, path, tmp_path):
     assert callable(diagnose) and callable(at.gap.diagnose)
     with pytest.raises(at.AirTouchError, match="no flight to diagnose|too short|no flight in it"):
         at.gap.diagnose(log.slice(0, 150))
+
+
+@pytest.mark.parametrize("without, words", [(["magic"], "no effect 'magic'"),
+                                            ("wind", r"a list of effects: \['wind'\]")])
+def test_effects_to_leave_out_are_checked(log, without, words):
+    with pytest.raises(AirTouchError, match=words):
+        at.gap.diagnose(log, without=without)
+
+
+def test_a_report_that_is_there_is_told_before_the_diagnosis(log, tmp_path, monkeypatch):
+    monkeypatch.setattr("airtouch.gap.diagnosis.diagnose", lambda *_, **__: pytest.fail("diagnosed first"))
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(AirTouchError, match="use force=True to replace it"):
+        at.gap.diagnose(log, report=tmp_path / "report.html")
 
 
 def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):

@@ -127,6 +127,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 
+    _check_speed(speed_mps)
     module, inputs = registry.get(detector), _several(flights)
     if not inputs:
         raise AirTouchError("no flight to score")
@@ -183,8 +184,11 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
     import airtouch.gap.diagnosis as module
+    from airtouch.logs.files import check_free
     from airtouch.report import gap_report
 
+    if report is not None:
+        check_free(Path(report), force)
     logs = _logs(flights)
     diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), _logs(baseline), without=without,
                                 pictures=report is not None)
@@ -224,6 +228,7 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.vehicle import DEFAULT_VEHICLE
 
     need("train", "training")
+    _check_speed(speed_mps)
     out = Path(out)
     check_free(out, force)
     if twin is not None and vehicle is not None:
@@ -269,9 +274,21 @@ def _logs(flights: "Flight | Iterable[Flight]") -> list[FlightLog]:
 
 
 def _several(flights: Any) -> list[Any]:
-    """One flight or several as a list."""
-    one = isinstance(flights, (str, Path, FlightLog)) or hasattr(flights, "columns")
-    return [flights] if one else list(flights)
+    """One flight or several as a list. Raises AirTouchError for what is neither."""
+    if isinstance(flights, (str, Path, FlightLog)) or hasattr(flights, "columns"):
+        return [flights]
+    if not isinstance(flights, Iterable):
+        raise AirTouchError("flights are file names, FlightLogs or pandas tables, one or a list of them, not "
+                            f"{type(flights).__name__}")
+    return list(flights)
+
+
+def _check_speed(speed_mps: float | None) -> None:
+    """Raise AirTouchError for a commanded speed that the command line refuses too; None is no speed."""
+    from airtouch.detector.evaluation.data.dataset import MOST_MPS
+
+    if speed_mps is not None and not (isinstance(speed_mps, numbers.Real) and 0 < speed_mps <= MOST_MPS):
+        raise AirTouchError(f"speed_mps must be above 0 and at most {MOST_MPS:g} m/s, not {speed_mps!r}")
 
 
 def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":

@@ -53,7 +53,8 @@ def test_the_command_writes_scores_and_a_line_of_the_ledger_for_each_look(genera
 
 @pytest.mark.parametrize("options, message", [
     (["--silence-training"], "needs --silence"), (["--random-epochs", 60], "needs --random-windows"),
-    (["--random-windows"], "for --detector paper"),
+    (["--random-windows"], "for --detector paper"), (["--epochs", 3], "best takes --steps"),
+    (["--epochs", 3, "--detector", "baseline"], "the baseline has none"),
     (["--random-windows", "--detector", "baseline"], "for --detector paper")])
 def test_an_option_without_its_other_is_refused(generated, tmp_path, options, message):
     result = run(generated, "--out", tmp_path / "folds", *options)

@@ -2,14 +2,14 @@
 
 import made_diagnosis
 from airtouch.cli.gap import show
-from airtouch.cli.shared import scores
+from airtouch.cli.shared import output
 from airtouch.gap.answer.sentences import sentences
 
 
 def test_terminal_prints_sentences_notes_and_advice(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "400")
     result = made_diagnosis.of_flights(made_diagnosis.fly_pushed())
-    show.diagnosis(scores.console(), result)
+    show.diagnosis(output.console(), result)
     out = " ".join(capsys.readouterr().out.split())
     for part in (*sentences(result), "another fits better", "Weigh the <vehicle>.",
                  "airtouch collect --mission hover"):
@@ -19,7 +19,7 @@ def test_terminal_prints_sentences_notes_and_advice(capsys, monkeypatch):
 def test_a_shrink_that_was_not_measured_is_no_nought(capsys, monkeypatch):
     """Of a mass it was measured, of `none` and `unknown` it was not."""
     monkeypatch.setenv("COLUMNS", "400")
-    show.diagnosis(scores.console(), made_diagnosis.diagnosis())
+    show.diagnosis(output.console(), made_diagnosis.diagnosis())
     rows = [line.replace("│", " ").split() for line in capsys.readouterr().out.splitlines()]
     assert {r[0]: r[2] for r in rows if r[:1] and r[0] in ("mass", "none", "unknown")} \
         == {"mass": "0.00", "none": "-", "unknown": "-"}

@@ -11,8 +11,8 @@ from rich.console import Console
 
 import airtouch.gap.diagnosis as diagnose
 from airtouch.cli.gap import show
-from airtouch.cli.gap.progress import Bar
-from airtouch.cli.shared import scores
+from airtouch.cli.gap.progress import LateBar
+from airtouch.cli.shared import output
 from airtouch.gap import example
 from airtouch.logs import read
 from airtouch.report.columns import COLUMNS
@@ -38,14 +38,14 @@ def printed(width, show_on):
 @pytest.mark.parametrize("count", [1, 3, 7])
 def test_every_figure_of_every_summary_is_printed(width, count):
     rows = {f"case {n}": summary(n / 100) for n in range(count)}
-    text = printed(width, lambda screen: scores.print_table(screen, rows, "a title"))
+    text = printed(width, lambda screen: output.print_table(screen, rows, "a title"))
     assert "\u2026" not in text and max(map(len, text.splitlines())) <= width
     assert all(f"case {n}" in text and f"{n}%" in text for n in range(count))
     assert text.count("90% - 100%") == count and text.count("a title") == text.count("95 % interval") == 1
 
 
 def test_the_caption_explains_columns_that_are_there():
-    explained = re.findall(r"(?:^|\. )([^.:]+(?:\.\d+ m)?): ", scores.CAPTION)
+    explained = re.findall(r"(?:^|\. )([^.:]+(?:\.\d+ m)?): ", output.CAPTION)
     assert explained[0] == "second line" and len(explained) == 4
     assert set(explained[1:]) <= set(COLUMNS)
 
@@ -77,8 +77,8 @@ def test_the_bar_of_a_long_command_needs_nothing_slow():
 
 
 def test_a_long_command_without_a_terminal_says_by_lines_where_it_is(monkeypatch, capsys):
-    monkeypatch.setattr(Bar, "LINE_S", 0.05)
-    with Bar(3, "diagnosing") as bar:
+    monkeypatch.setattr(LateBar, "LINE_S", 0.05)
+    with LateBar(3, "diagnosing") as bar:
         bar("flight_1.csv")
         time.sleep(0.3)
     lines = capsys.readouterr().err.splitlines()

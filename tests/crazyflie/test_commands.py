@@ -1,5 +1,6 @@
 """The commands without a drone: what they ask for, and what they refuse in one line."""
 
+import re
 import signal
 import threading
 from unittest.mock import Mock
@@ -79,6 +80,31 @@ def test_ctrl_c_at_the_question_ends_the_program_before_anything_is_armed(tmp_pa
     with pytest.raises(KeyboardInterrupt):
         cli_collect._fly(collect.Plan("x", tmp_path, "hop"), {1: Mock(seconds=1.0)}, tmp_path, ask=True)
     flown.assert_not_called()
+
+
+def test_the_room_that_is_printed_is_that_of_the_flights_flown(tmp_path, monkeypatch):
+    """The values of each flight are drawn: where it goes is what the pilot gets."""
+    printed = r"x (\S+) to (\S+) m ahead, y (\S+) to (\S+) m to the left, up to (\S+) m high"
+    flown = []
+
+    def fly(drone, ready, mission, plan, number, **_):
+        flown.append(mission)
+        print(f"flown: {max(leg.x_m for leg in mission.legs):.1f} m")
+        return Mock(planned=True)
+
+    monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", Mock())
+    monkeypatch.setattr(readiness, "make_ready", Mock())
+    monkeypatch.setattr(collect, "fly", fly)
+    monkeypatch.setattr(cli_collect, "_report", Mock())
+    output = run("collect", "--out", tmp_path, "--uri", "x", "--mission", "paper-9cm", "-n", "6", "--yes").output
+    whole, *of_each = [re.search(printed, line) for line in output.splitlines() if re.search(printed, line)]
+    distances = [max(leg.x_m for leg in one.legs) for one in flown]
+    assert max(distances) - min(distances) > 0.5
+    assert [float(found[2]) for found in of_each] == pytest.approx(distances, abs=0.05)
+    assert float(whole[2]) == pytest.approx(max(distances), abs=0.05)
+    assert float(whole[5]) == pytest.approx(max(leg.z_m for one in flown for leg in one.legs), abs=0.005)
+    assert all(output.index(found[0]) < output.index(f"flown: {x:.1f}")
+               for found, x in zip(of_each, distances, strict=True))
 
 
 def fly_once(tmp_path, drone, stop):

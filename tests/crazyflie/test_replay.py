@@ -56,6 +56,16 @@ def test_the_command_prints_what_evaluate_prints(flight):
     assert row in result.output and "detected at" in result.output
 
 
+def test_the_commanded_speed_is_asked_for_by_its_own_name(flight, tmp_path):
+    """--speed is that of the playback here, also called --rate."""
+    log = logs.read(flight)
+    logs.write(logs.FlightLog(log.columns, {}), tmp_path / "f.csv")
+    asked = CliRunner().invoke(airtouch, ["replay", str(tmp_path / "f.csv"), "--speed", "0.3"])
+    assert "--flown-at" in str(asked.exception) and "--speed" not in str(asked.exception)
+    both = [CliRunner().invoke(airtouch, ["replay", str(flight), name, "1000"]) for name in ("--speed", "--rate")]
+    assert both[0].output == both[1].output and both[0].exit_code == 0
+
+
 def test_pieces_of_one_row_give_the_same(flight):
     log, row_by_row, all_at_once = logs.read(flight), HostDetector(), HostDetector()
     for i in range(0, 900):

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from airtouch.cli.paper import command
 from airtouch.errors import AirTouchError
-from airtouch.paper_figures import run
+from airtouch.paper_figures import run, words
 from airtouch.paper_figures.claims import REPRODUCED, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
@@ -23,7 +23,8 @@ def figures(monkeypatch):
 
     def works(job):
         calls.append(job.quick)
-        verdicts = {name: Verdict(REPRODUCED, f"n = {len(calls)} <of 3>") for name in ("height-4cm", "height-9cm")}
+        verdicts = {name: Verdict(REPRODUCED, f"n = {len(calls)} <of 3>", "best alone")
+                    for name in ("height-4cm", "height-9cm")}
         return Figure("Works", [{"what": "a", "value": 1.5}, {"what": "b", "n": 2}], "Simulated.", verdicts,
                       lambda canvas: canvas.subplots().plot([1, 2]))
 
@@ -54,6 +55,23 @@ def test_what_is_missing_is_said_and_the_others_are_made(figures, tmp_path):
     assert "n = 1 &lt;of 3&gt;" in page and "Not made: no recorded flights" in page and "0.364" not in page
 
 
+def test_the_page_says_what_is_judged_and_by_which_margins(figures, tmp_path, monkeypatch):
+    monkeypatch.setattr(words, "ERROR_MARGIN", 0.4)
+    run.run(["fig8d", "fig8e"], tmp_path, Job(None, tmp_path / "work"))
+    page = (tmp_path / "index.html").read_text()
+    assert "at most 40 % above the paper" in page
+    assert page.count("of best alone") == 2  # the two verdicts, and not those that could not be tested
+
+
+def test_each_figure_keeps_the_command_that_made_it(figures, tmp_path):
+    first, second = "airtouch paper --flights 'my flights'", "airtouch paper --only fig8e --power-log run.csv"
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"), command=first)
+    run.run(["fig8d", "fig8e"], tmp_path, Job(None, tmp_path / "work"), command=second)
+    page = (tmp_path / "index.html").read_text()
+    assert page.index("my flights") < page.index('<section id="fig8e">') < page.index(second)
+    assert json.loads((tmp_path / "fig8d.json").read_text())["command"] == first
+
+
 def test_done_figures_stay_and_damaged_ones_are_made_again(figures, tmp_path):
     job = Job(None, tmp_path / "work")
     run.run(["fig8d"], tmp_path, job)
@@ -75,11 +93,33 @@ def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
     assert figures == [False, True] and json.loads((tmp_path / "fig8d.json").read_text())["quick"]
 
 
+def test_a_figure_is_stale_by_what_it_reads_alone(figures, tmp_path):
+    flights, air = tmp_path / "data" / "flights", tmp_path / "data" / "imrclab"
+    for folder in (flights, air):
+        folder.mkdir(parents=True)
+        (folder / "a.csv").write_text("t_s\n0\n")
+    log = tmp_path / "run.csv"
+    log.write_text("time_ms\n")
+    job = Job(flights, tmp_path / "work")
+    run.run(["fig8d"], tmp_path, job)
+    run.run(["fig8d"], tmp_path, Job(flights, tmp_path / "work", power_log=log))
+    assert len(figures) == 1  # no power is in it
+    assert run.settings_key(job, "table1") != run.settings_key(Job(flights, tmp_path, power_log=log), "table1")
+    assert run.settings_key(job, "wind") == run.settings_key(Job(None, tmp_path), "wind")
+    (air / "b.csv").write_text("t_s\n0\n")  # `best` is trained on it too
+    with pytest.raises(AirTouchError, match="fig8d.csv was made with other settings"):
+        run.run(["fig8d"], tmp_path, job)
+
+
 def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tmp_path, monkeypatch):
     monkeypatch.setattr("airtouch.cli.paper.find_flights", lambda: None)
     # one worker: a process of its own would make the real figures, not these
     result = CliRunner().invoke(command, ["--out", str(tmp_path), "--workers", "1"])
-    assert result.exit_code == 2 and "reproduced" in result.stdout and "Not made" not in result.stdout
+    lines = [line.split(maxsplit=1) for line in result.stdout.splitlines() if not line.startswith(" ")]
+    verdicts = [(name, rest) for name, rest in lines if name in ("fig8d", "fig8e", "table1")]
+    assert [name for name, rest in verdicts if rest.startswith(REPRODUCED)] == ["fig8d", "fig8d"]
+    assert [name for name, rest in verdicts if rest.startswith(UNTESTABLE)] == ["fig8e"] * 2 + ["table1"] * 2
+    assert result.exit_code == 2 and "Not made" not in result.stdout
     with pytest.raises(AirTouchError, match="no figure 'fig8x'; did you mean"):
         run.names(["fig8x"])
     missing = CliRunner().invoke(command, ["--flights", str(tmp_path / "none"), "--out", str(tmp_path)])

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import kernels, logs
-from airtouch.cli.shared import scores as show_scores
+from airtouch.cli.shared import output
 from airtouch.cli.shared.arguments import whole_number
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.progress import with_bar
@@ -193,10 +193,10 @@ def main() -> None:
     for fold, (choice, lag) in choices(flights, results).items():
         nested += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
     result = evaluate.as_json("best", nested, [], lag_of(results[winner]), asdict(settings[winner]))
-    show_scores.print_table(show_scores.console(), {"best": result, **result["by_height"]},
+    output.print_table(output.console(), {"best": result, **result["by_height"]},
                             "each fold with the settings best on the others")
     if options.json:
-        show_scores.write_json(options.json, result, options.force)
+        output.write_json(options.json, result, options.force)
 
 
 def print_figures(title: str, flights: list[HeldOutFlight], outcomes_of: list[tuple[np.ndarray, int]]) -> None:

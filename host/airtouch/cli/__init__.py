@@ -91,8 +91,5 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a caller may have replaced it
             stream.reconfigure(errors="backslashreplace")
-    try:
-        with in_one_line("airtouch"):
-            airtouch()
-    except BrokenPipeError:
-        sys.exit(141)
+    with in_one_line("airtouch"):
+        airtouch()

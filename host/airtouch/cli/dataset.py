@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import click
+from rich.console import Console
 from rich.progress import Progress
 
 from airtouch.cli import Suggesting
@@ -37,7 +38,7 @@ def fetch(out: Path, source: Path | None, base_url: str, force: bool) -> None:
 
 def _fetch(out: Path, source: Path | None, base_url: str, force: bool) -> None:
     """Fetch the flights and print their numbers. Raises AirTouchError where some failed."""
-    with Progress(transient=True) as bar:
+    with Progress(transient=True, console=Console(stderr=True)) as bar:
         task = bar.add_task("flights", total=len(public.registry()))
         states = public.fetch(out, source=source, base_url=base_url, force=force,
                               progress=lambda name, state: bar.update(task, advance=1, description=name))

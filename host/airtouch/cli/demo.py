@@ -7,9 +7,10 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS, find_flights
+from airtouch.cli.shared import output
+from airtouch.cli.shared.flights import find_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
@@ -34,8 +35,7 @@ COMPILES = "the first time compiles the simulator, which takes a minute"
               help="Folder for the report, the model and simulated flights.")
 @click.option("--flights", type=click.Path(path_type=Path),
               help="Recorded flights; AIRTOUCH_FLIGHTS or ../shared/flights if left out, else simulated.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest.")
+@speed_option
 @click.option("--epochs", type=click.IntRange(1), default=EPOCHS, show_default=True, help="Training epochs.")
 @click.option("--force", is_flag=True, help="Replace what an earlier demo wrote.")
 def command(out: Path, flights: Path | None, speed: float | None, epochs: int, force: bool) -> None:
@@ -54,9 +54,9 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     if not force and any((out / "model").glob("*")):
         raise AirTouchError(f"{out / 'model'}: holds a model already; use --force to replace it")
     make_folder(out)
-    steps = Steps(started)
+    headings = Headings(started)
 
-    steps.say("Flights")
+    headings.say("Flights")
     with Bar("  flights ") as bar:
         demo = demo_flights.choose(flights or find_flights(), out / "flights", speed,
                                      lambda line: click.echo(f"airtouch: {line}", err=True),
@@ -65,25 +65,25 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     click.echo(f"  {origin}: {len(demo.train)} to train on, {len(test)} held out, split by flight")
     training, left_out = demo_flights.readable(demo.train)
 
-    steps.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
+    headings.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
     short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
     names = sorted(SCORED, key=order)
     models = {name: fit(name, training, short.get(name, {})) for name in names}
 
-    steps.say("Export: C sources for the GAP8")
+    headings.say("Export: C sources for the GAP8")
     export({name: models[name] for name in ("paper", "best")}, out / "model")
 
-    steps.say("Detection on the held-out flights, through the C kernels and the C int8 network")
+    headings.say("Detection on the held-out flights, through the C kernels and the C int8 network")
     results = {name: detect(name, model, test, left_out) for name, model in models.items()}
     if not results[names[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
     scored = score_report({name: [r.score for r in of_detector] for name, of_detector in results.items()},
                           shown_flights(results, SHOWN))
-    show.print_table(show.console(), scored.summaries, origin)
+    output.print_table(output.console(), scored.summaries, origin)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
 
-    steps.say("Report")
+    headings.say("Report")
     write_report(report, f"AirTouch demo: {origin}", scored,
                  parameters={f"{n}: {key}": value for n, model in models.items()
                              for key, value in registry.get(n).parameters(model).items()},
@@ -92,7 +92,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
     click.echo(f"\ndone in {time.monotonic() - started:.0f} s")
 
 
-class Steps:
+class Headings:
     """Headings with the time since the start."""
 
     def __init__(self, started: float) -> None:

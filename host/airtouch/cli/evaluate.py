@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import speed_option
 from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -24,8 +24,7 @@ from airtouch.logs.files import check_free
 @click.option("--detector", default="best", show_default=True, help="best, paper, paper-stream or baseline.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained model (.npz); the shipped one if left out.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; default: the log's.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
@@ -62,12 +61,12 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     _print_remarks(remarks)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
     result["remarks"] = remarks
-    screen = show.console()
+    screen = output.console()
     if scores:
-        show.print_table(screen, {detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off")
+        output.print_table(screen, {detector: result}, f"{detector}: lag of {result['lag_s']:.2f} s taken off")
         for what in ("height", "angle", "wind"):
             if len(result[f"by_{what}"]) > 1:
-                show.print_table(screen, result[f"by_{what}"], f"by {what}")
+                output.print_table(screen, result[f"by_{what}"], f"by {what}")
         for name in sorted({s.note for s in scores if s.note}):
             screen.print(f"note: {name} ({sum(s.note == name for s in scores)} flights)")
     trained_on = len(result["in_training"])
@@ -75,9 +74,9 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
         screen.print(f"warning: the model was trained on {_which(trained_on, len(scores))}, so these figures do not "
                      "hold for other flights; airtouch crossval estimates those")
     if json_path:
-        show.write_json(json_path, result, force)
+        output.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
-    show.left_out(failures, len(scores))
+    output.left_out(failures, len(scores))
     if failures:
         sys.exit(2)
 

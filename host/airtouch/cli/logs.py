@@ -13,6 +13,7 @@ import click
 from airtouch import logs
 from airtouch.cli import Suggesting
 from airtouch.cli.shared.flights import flights_of_folder
+from airtouch.cli.shared.options import Finite
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write
 from airtouch.logs.formats.rosbag import is_bag
@@ -86,7 +87,8 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
               help="TOML file that maps the columns of other programs' CSV files to the schema.")
 @click.option("--plain", is_flag=True,
               help="With csv: a header and numbers alone, as PlotJuggler and spreadsheets want it.")
-@click.option("--rate", type=float, help="Resample to exactly this rate in Hz (else samples stay as logged).")
+@click.option("--rate", type=Finite(0, min_open=True),
+              help="Resample to exactly this rate in Hz (else samples stay as logged).")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, plain: bool, rate: float | None,
             force: bool) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from airtouch import logs
-from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared.options import SPEED_MPS, Finite
 from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
@@ -19,9 +19,10 @@ from airtouch.logs.files import check_free, write_bytes
 @click.option("--model", type=click.Path(path_type=Path), help="Trained model (.npz); the shipped one if left out.")
 @click.option("--truth", is_flag=True, help="Map the true edges of the down range instead of the detector's.")
 @click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Speed for dead reckoning where the log has no position; the manifest's or the log's if left out.")
-@click.option("--heading", default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
-@click.option("--sigma", type=click.FloatRange(0, 5, min_open=True), metavar="S",
+              help="Commanded speed, before that of the manifest or the log: for dead reckoning where the log has no "
+                   "position.")
+@click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
+@click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; the model's own if left out.")
 @click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write; the plot goes beside it as .png.")
 @click.option("--force", is_flag=True, help="Replace both.")

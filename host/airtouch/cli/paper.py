@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared.flights import find_flights
+from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 
@@ -63,8 +64,7 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
         if path is not None and not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
     job = Job(flights or find_flights(), out / "work", quick, power_log, partial(click.echo, err=True))
-    shown = " ".join(["airtouch paper", *(f"--only {name}" for name in only), *(["--quick"] if quick else [])])
-    records = run.run(chosen, out, job, force=force, command=shown, workers=workers or min(available_cores(), 4))
+    records = run.run(chosen, out, job, force=force, command=typed(), workers=workers or min(available_cores(), 4))
     for name in chosen:
         for claim in records[name]["claims"].values():
             click.echo(f"{name:7} {claim['verdict']:22} {claim['said']}\n        {claim['found']}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from airtouch.cli.shared.help import examples
-from airtouch.errors import AirTouchError
+from airtouch.cli.shared.options import seed_option
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
     "airtouch simulate mine.toml -n 1000 --out many --workers 8",
     "airtouch simulate --list-effects"))
 @click.argument("scenario")
-@click.option("--flights", "-n", default=1, show_default=True, help="How many flights.")
+@click.option("--flights", "-n", type=click.IntRange(1), default=1, show_default=True, help="How many flights.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True,
               help="Folder for the logs.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Name or .toml file.")
@@ -60,8 +60,8 @@ def _list_scenarios(ctx: click.Context, _: click.Parameter, value: bool) -> None
               help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")
 @click.option("--without", multiple=True, metavar="NAME", help="Switch an effect of the scenario off.")
 @click.option("--effect-file", "files", multiple=True, help="Python file with an effect of your own.")
-@click.option("--seed", default=0, show_default=True, help="Of the whole batch.")
-@click.option("--workers", type=int, help="Processes; default one a core.")
+@seed_option("Of the whole batch.")
+@click.option("--workers", type=click.IntRange(1), help="Processes; default one a core.")
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler.")
 @click.option("--force", is_flag=True, help="Remove flights of another request from --out.")
 @click.option("--list-effects", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects,
@@ -88,8 +88,6 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     from airtouch.simulation.stepper import Stepper
     from airtouch.simulation.workers import cluster, local, store
 
-    if flights < 1 or seed < 0 or (workers is not None and workers < 1):
-        raise AirTouchError("--flights and --workers must be 1 or more, --seed 0 or more")
     plugins = []
     for path in files:
         effects.load_file(path)
@@ -140,11 +138,13 @@ def _say_diverged(flights: Sequence[dict[str, Any]], record: Path) -> None:
 
 
 def _write(results, count: int, out: Path, name: str) -> None:
+    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from airtouch.simulation.workers import store
 
-    with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as bar:
+    with Progress(TextColumn("flights"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+                  console=Console(stderr=True)) as bar:
         task = bar.add_task("flights", total=count)
         for result in results:
             if result is not None:

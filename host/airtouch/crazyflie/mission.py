@@ -57,10 +57,22 @@ class Mission:
 
     def describe(self) -> str:
         """One line with the legs and the room that they need."""
-        x0, x1, y0, y1, z1 = self.room_m
         speed = f", {self.speed_mps:g} m/s" if self.speed_mps else ""
-        return (f"{self.name}: {self.seconds:.0f} s{speed}; x {x0:.1f} to {x1:.1f} m ahead, "
-                f"y {y0:.1f} to {y1:.1f} m to the left, up to {z1:.2f} m high")
+        return f"{self.name}: {self.seconds:.0f} s{speed}; {_room_in_words(self.room_m)}"
+
+
+def describe_all(missions: Sequence[Mission]) -> str:
+    """One line with the room that all flights of a mission need, whose drawn values differ."""
+    if len(missions) == 1:
+        return missions[0].describe()
+    x0, x1, y0, y1, z1 = zip(*(one.room_m for one in missions), strict=True)
+    whole = _room_in_words((min(x0), max(x1), min(y0), max(y1), max(z1)))
+    return f"{missions[0].name}: {len(missions)} flights; the room of all of them: {whole}"
+
+
+def _room_in_words(room_m: tuple[float, float, float, float, float]) -> str:
+    x0, x1, y0, y1, z1 = room_m
+    return f"x {x0:.1f} to {x1:.1f} m ahead, y {y0:.1f} to {y1:.1f} m to the left, up to {z1:.2f} m high"
 
 
 def names() -> list[str]:

@@ -33,6 +33,7 @@ from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import effects
 from airtouch.vehicle import Vehicle
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
@@ -77,9 +78,9 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
     other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
     these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
-    flights, or where `before` has another vehicle, baseline or effects left out.
+    flights, an unknown effect, or where `before` has another vehicle, baseline or effects left out.
     """
-    say, without = progress or (lambda _: None), tuple(without)
+    say, without = progress or (lambda _: None), _names(without)
     if partner and len(flights) != 1:
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
@@ -115,6 +116,13 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
                    calibrated=calibrated, calibrated_with=calibrated_with)
+
+
+def _names(without: Iterable[str]) -> tuple[str, ...]:
+    """The effects to leave out. Raises AirTouchError for one name in place of several, and for an unknown one."""
+    if isinstance(without, str):
+        raise AirTouchError(f"without is a list of effects: [{without!r}]")
+    return tuple(effects.get(name).name for name in without)
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),

@@ -32,10 +32,14 @@ class Job:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A verdict of `claims` (reproduced, undecided, ...) and the figures behind it, with n and interval."""
+    """A verdict of `claims` (reproduced, undecided, ...) and the figures behind it, with n and interval.
+
+    judged: the detector, or what else the verdict is on.
+    """
 
     verdict: str
     evidence: str
+    judged: str = "the paper's method"
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from airtouch import __version__
 from airtouch.logs.files import write_bytes
+from airtouch.paper_figures import words
 from airtouch.paper_figures.claims import CLAIMS, NOT_REPRODUCED, REPRODUCED, UNDECIDED, UNTESTABLE
 from airtouch.report.html_page import data_url, rendered
 
 CLASSES = {REPRODUCED: "yes", NOT_REPRODUCED: "no", UNDECIDED: "open", UNTESTABLE: "open"}
 
 
-def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
+def write(out: Path, records: dict[str, dict[str, Any]]) -> Path:
     """Write `index.html` to the folder `out`. It is self-contained except for links to each figure's SVG and CSV.
 
     records: name of a figure -> its record (`run.record`). Returns the file.
@@ -24,8 +24,9 @@ def write(out: Path, records: dict[str, dict[str, Any]], command: str) -> Path:
     text = rendered(
         "page.html", folder="airtouch.paper_figures",
         records=[{**entry, "image": _image(out, entry)} for entry in records.values()], classes=CLASSES, count=count,
-        verdicts=CLASSES, total=len(CLAIMS), judged=len(verdicts), command=command, version=__version__,
-        quick=any(entry.get("quick") for entry in records.values()))
+        verdicts=CLASSES, untestable=UNTESTABLE, total=len(CLAIMS), judged=len(verdicts),
+        error_margin=f"{100 * words.ERROR_MARGIN:g}", share_margin=f"{100 * words.SHARE_MARGIN:g}",
+        most_missed=f"{100 * words.MOST_MISSED:g}", quick=any(entry.get("quick") for entry in records.values()))
     path = out / "index.html"
     write_bytes(text.encode(), path, force=True)
     return path

@@ -42,7 +42,8 @@ def scores(job: Job, name: str) -> tuple[list[FlightScore], list[Fold]]:
     """
     flights = files(job)
     options = (QUICK if job.quick else FULL)[name]
-    air = free_air.read(_air(job.flights)) if job.flights and name == "best" and not job.quick else []
+    folders = free_air_folders(job.flights) if job.flights and name == "best" and not job.quick else []
+    air = free_air.read(folders) if folders else []
     held_out = folds.by_fold(flights)
     if job.quick:
         held_out = {QUICK_FOLD: held_out[QUICK_FOLD]} if QUICK_FOLD in held_out else dict(list(held_out.items())[:1])
@@ -73,7 +74,8 @@ def in_float(job: Job, name: str, held_out: list[Fold]) -> list[FlightScore]:
                              job.work / "folds")
 
 
-def _air(flights: Path) -> list[Path]:
+def free_air_folders(flights: Path) -> list[Path]:
+    """The folders of AIR that are there."""
     return [folder for name in AIR if (folder := flights.parent / name).is_dir()]
 
 

@@ -14,8 +14,8 @@ from typing import Any
 
 from airtouch import __version__
 from airtouch.errors import AirTouchError, unknown
-from airtouch.logs.files import make_folder, write_bytes
-from airtouch.paper_figures import claims, page, pictures
+from airtouch.logs.files import in_folder, make_folder, write_bytes
+from airtouch.paper_figures import claims, page, pictures, recorded
 from airtouch.paper_figures.figure import Figure, Job, Missing, table_csv
 
 #: name on the command line -> (module, function), in the order of the page
@@ -29,6 +29,8 @@ FIGURES = {
     "fig11c": ("vision", "network_size"),
     "fusion": ("vision", "fusion"), "range": ("sensing_range", "sensing_range"),
 }
+#: figures that read recorded flights
+RECORDED = {"fig8a", "fig8c", "fig8d", "fig8e", "fig8g", "fig8h", "fig8i", "sizes", "table2", "fig11c"}
 #: figures that share trainings or films: one process makes each group; the longest first
 GROUPS = (("fig8a", "fig8c", "fig8d", "fig8e", "sizes", "table2"), ("fig8g", "fig8h", "fig8i"),
           ("fig11b", "fig11c", "fusion"), ("fig8b", "fig8f"), ("wind",), ("table1",), ("range",))
@@ -54,51 +56,51 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     Returns the records: name -> record. A figure with the same settings is not made again. A figure with missing or bad
     input has the reason in its record ("missing"), and the others are made. workers: processes; `job.tell` must then be
     a function that can be pickled. Raises AirTouchError, before any work, if `out` holds a figure with other settings,
-    without `force`; and if a process dies.
+    without `force`; and if a process dies. command: as it was typed, for the records of the figures that are made.
     """
-    key = settings_key(job)
     old = {name: record(out, name) for name in chosen}
-    stale = [name for name, entry in old.items() if entry and entry["key"] != key and "missing" not in entry]
+    same = {name for name, entry in old.items() if entry and entry["key"] == settings_key(job, name)}
+    stale = [name for name, entry in old.items() if entry and name not in same and "missing" not in entry]
     if stale and not force:
         raise AirTouchError(f"{out / stale[0]}.csv was made with other settings; use --force, or another --out")
     make_folder(out)
     done = [name for name, entry in old.items()
-            if entry and entry["key"] == key and "missing" not in entry and not force]
+            if entry and name in same and "missing" not in entry and not force]
     for name in done:
         job.tell(f"{name}: done before")
     undone = [name for name in chosen if name not in done]
     groups = [part for group in GROUPS if (part := [name for name in undone if name in group])]
     if workers == 1 or len(groups) < 2:
-        make_all(undone, job, out, key, command)
+        make_all(undone, job, out, command)
     else:
-        _make_in_processes(groups, job, out, key, command, workers)
+        _make_in_processes(groups, job, out, command, workers)
     all_records = records(out)
-    page.write(out, all_records, command)
+    page.write(out, all_records)
     return all_records
 
 
-def make_all(chosen: Sequence[str], job: Job, out: Path, key: str, command: str) -> None:
+def make_all(chosen: Sequence[str], job: Job, out: Path, command: str) -> None:
     """Make figures one after the other, and write each with its record and the page to `out`."""
     for name in chosen:
         started, cpu_before = time.monotonic(), time.process_time()
         job.tell(f"{name} ...")
         entry = make(name, job, out)
-        entry |= {"key": key, "seconds": round(time.monotonic() - started, 1),
-                  "cpu_seconds": round(time.process_time() - cpu_before, 1), "quick": job.quick}
+        entry |= {"key": settings_key(job, name), "seconds": round(time.monotonic() - started, 1),
+                  "cpu_seconds": round(time.process_time() - cpu_before, 1), "quick": job.quick, "command": command,
+                  "version": __version__}
         write_bytes(json.dumps(entry, indent=1).encode(), out / f"{name}.json", force=True)
-        page.write(out, records(out), command)
+        page.write(out, records(out))
         job.tell(f"{name}: {entry.get('missing') or 'written'}, {entry['seconds']:.0f} s ({entry['cpu_seconds']:.0f} s "
                  "of processor time)")
 
 
-def _make_in_processes(groups: Sequence[Sequence[str]], job: Job, out: Path, key: str, command: str,
-                       workers: int) -> None:
+def _make_in_processes(groups: Sequence[Sequence[str]], job: Job, out: Path, command: str, workers: int) -> None:
     """`make_all` for each group, in processes."""
     for variable in ONE_THREAD:
         os.environ.setdefault(variable, "1")
     context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        futures = [pool.submit(make_all, group, job, out, key, command) for group in groups]
+        futures = [pool.submit(make_all, group, job, out, command) for group in groups]
         try:
             for future in as_completed(futures):
                 future.result()
@@ -125,7 +127,7 @@ def make(name: str, job: Job, out: Path) -> dict[str, Any]:
     if set(figure.verdicts) != set(verdicts):
         raise AirTouchError(f"{name}: verdicts of {', '.join(figure.verdicts)}, claims {', '.join(verdicts)}")
     for claim, verdict in figure.verdicts.items():
-        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.evidence}
+        verdicts[claim] |= {"verdict": verdict.verdict, "found": verdict.evidence, "judged": verdict.judged}
     png, svg = pictures.render(figure.draw)
     table = table_csv(figure.rows)
     for data, ending in ((png, "png"), (svg, "svg"), (table, "csv")):
@@ -150,11 +152,21 @@ def record(out: Path, name: str) -> dict[str, Any] | None:
         return None
 
 
-def settings_key(job: Job) -> str:
-    """Hash, of twelve hexadecimal digits, of everything that a figure depends on except the code."""
+def settings_key(job: Job, name: str) -> str:
+    """Hash, of twelve hexadecimal digits, of everything that a figure depends on except the code.
+
+    Of files that is their names, sizes and times: the recorded flights (the free-air ones too, which `best` is trained
+    on in a whole run), or the power log, for the figures that read them.
+    """
+    files: list[Path] = []
+    if name in RECORDED and job.flights is not None:
+        files = sorted(job.flights.iterdir()) if job.flights.is_dir() else []
+        for folder in () if job.quick else recorded.free_air_folders(job.flights):
+            files += in_folder(folder, below=True)
+    elif name == "table1" and job.power_log is not None:
+        files = [job.power_log]
     total = hashlib.sha256(f"{__version__} {job.quick}".encode())
-    for place in (job.flights, job.power_log):
-        for path in sorted(place.iterdir()) if place is not None and place.is_dir() else [place]:
-            stat = os.stat(path) if path is not None and path.exists() else None
-            total.update(f"{path and path.name} {stat and (stat.st_size, stat.st_mtime_ns)}".encode())
+    for path in files:
+        stat = path.stat() if path.exists() else None
+        total.update(f"{path.name} {stat and (stat.st_size, stat.st_mtime_ns)}".encode())
     return total.hexdigest()[:12]

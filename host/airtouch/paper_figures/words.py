@@ -8,7 +8,7 @@ from airtouch.paper_figures.figure import Verdict
 
 MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
 #: Margins within which the 95 % interval of a difference must lie for "the same" or "reached". No source: chosen.
-ERROR_MARGIN = 0.25  #: of a mean error, as a fraction of it
+ERROR_MARGIN = 0.25  #: of a mean error or a power, as a fraction of it
 SHARE_MARGIN = 0.10  #: of a share: of edges missed, of edges within a distance
 
 
@@ -87,9 +87,9 @@ def inverse(answer: bool | None) -> bool | None:
     return None if answer is None else not answer
 
 
-def verdict(answer: bool | None, evidence: str) -> Verdict:
+def verdict(answer: bool | None, evidence: str, judged: str = Verdict.judged) -> Verdict:
     """The verdict "reproduced", "not reproduced", or for None "undecided", with the figures behind it."""
-    return Verdict(UNDECIDED if answer is None else REPRODUCED if answer else NOT_REPRODUCED, evidence)
+    return Verdict(UNDECIDED if answer is None else REPRODUCED if answer else NOT_REPRODUCED, evidence, judged)
 
 
 def table_row(name: str, row: Mapping[str, Any], **more: Any) -> dict[str, Any]:

@@ -1,16 +1,16 @@
 """`airtouch collect`: fly a mission with a Crazyflie and write the flight logs."""
 
-import math
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free, no_empty_folders
 from airtouch.vehicle import DEFAULT_VEHICLE
@@ -31,16 +31,6 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
     ctx.exit()
 
 
-class _Limit(click.FloatRange):
-    """A finite number of a range: a limit that is NaN or infinite would never be reached."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        number = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value} is not a finite number.", param, ctx)
-        return number
-
-
 @click.command("collect")
 @click.option("--uri", help="Of the drone: radio://0/80/2M/E7E7E7E7E7, usb://0, udp://127.0.0.1:19850.")
 @click.option("--mission", "mission_name",
@@ -55,11 +45,11 @@ class _Limit(click.FloatRange):
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Written into the log.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
               help="Set a parameter of the drone first.")
-@click.option("--min-battery", type=_Limit(min=0.0), default=3.7, show_default=True, metavar="V",
+@click.option("--min-battery", type=Finite(min=0.0), default=3.7, show_default=True, metavar="V",
               help="Least voltage on the ground.")
-@click.option("--link-timeout", type=_Limit(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
+@click.option("--link-timeout", type=Finite(min=0.0, min_open=True), default=3.0, show_default=True, metavar="S",
               help="Silence after which it lands as soon as it is heard again.")
-@click.option("--seed", default=0, show_default=True, help="For missions whose values are drawn.")
+@seed_option("For missions whose values are drawn.")
 @click.option("--cache", type=click.Path(path_type=Path),
               help="Folder for the drone's tables, to connect faster; ~/.cache/airtouch if left out.")
 @click.option("--yes", "-y", is_flag=True, help="Take off without asking.")
@@ -89,8 +79,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         raise AirTouchError("give --uri and --mission (airtouch collect --list-missions), or --recover")
     if flights < 1:
         raise AirTouchError("--flights must be 1 or more")
-    first = mission.load(mission_name, seed, number or 0)
-    name = name or Path(first.name).name
+    name = name or Path(mission.scene_of(mission_name).name).name
     plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
                         link_timeout, force)
     with no_empty_folders(out):
@@ -99,8 +88,8 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         numbers = range(first_number, first_number + flights)
         for i in numbers:
             check_free(recorder.flight_path(out, name, i), force)
-        click.echo(first.describe())
         missions = {i: mission.load(mission_name, seed, i) for i in numbers}
+        click.echo(mission.describe_all(list(missions.values())))
         planned = _fly(plan, missions, cache, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
 
@@ -131,6 +120,7 @@ def _fly(plan: "collect.Plan", missions: dict[int, "Mission"], cache: Path | Non
             raise click.Abort
         ready = readiness.make_ready(drone, plan.settings, plan.least_v, click.echo)
         for number, mission in missions.items():
+            click.echo(f"flight {number}: {mission.describe()}")
             if ask:
                 click.confirm(f"flight {number}: drone at the start, nose along x, room clear?", abort=True)
             with _display(mission.seconds) as show, stopping() as stop:

@@ -6,11 +6,12 @@ import click
 
 from airtouch.cli.drone.collect import stopping, waiting
 from airtouch.cli.drone.replay import screen
+from airtouch.cli.shared.options import Finite
 
 
 @click.command("monitor")
 @click.option("--uri", required=True, help="Of the drone: radio://0/80/2M/E7E7E7E7E7, udp://127.0.0.1:19850.")
-@click.option("--duration", type=click.FloatRange(0, min_open=True), metavar="S", help="Stop after so long.")
+@click.option("--duration", type=Finite(0, min_open=True), metavar="S", help="Stop after so long.")
 @click.option("--host-detector", is_flag=True,
               help="Run the detector here though the drone has the app; without the app it always does.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",

@@ -6,24 +6,26 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.shared import scores as table_of
+from airtouch.cli.shared import output
+from airtouch.cli.shared.options import SPEED_MPS, Finite
 from airtouch.errors import AirTouchError
 from airtouch.parameters import SAMPLE_RATE_HZ
 
 
 @click.command("replay")
 @click.argument("flight", type=click.Path(path_type=Path))
-@click.option("--speed", default=0.0, show_default="as fast as it goes", metavar="X",
-              type=click.FloatRange(0, 1000), help="Times real time; 1 is as it was flown.")
-@click.option("--flown-at", type=click.FloatRange(0, 100, min_open=True), metavar="M/S",
-              help="Commanded speed of a flight without one in manifest or log; needed for errors in metres.")
+@click.option("--rate", "--speed", "speed", default=0.0, show_default="as fast as it goes", metavar="X",
+              type=Finite(0, 1000), help="Of the playback, times real time; 1 is as it was flown. The drone's speed is "
+                                        "--flown-at.")
+@click.option("--flown-at", type=SPEED_MPS, metavar="M/S",
+              help="Commanded speed of a flight without one in its manifest; the log's if left out.")
 @click.option("--model", type=click.Path(path_type=Path),
               help="Trained `best` model (.npz); the shipped one if left out.")
 def command(flight: Path, speed: float, flown_at: float | None, model: Path | None) -> None:
     """Feed FLIGHT sample by sample to the detector that flies, and show it as `monitor` shows a drone.
 
     \b
-    airtouch replay flights/edge_0001.csv.gz --speed 1
+    airtouch replay flights/edge_0001.csv.gz --rate 1
     airtouch replay log.csv --flown-at 0.3            # prints edges and scores as fast as it goes
 
     The edges at the end are those of `airtouch evaluate`, figure for figure.
@@ -40,7 +42,10 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     files = dataset.collect([flight], flown_at)
     if len(files) != 1 or flight.is_dir():
         raise AirTouchError(f"{flight}: give one flight, not a folder")
-    log = evaluate.read_flight(files[0], evaluate.spare_of(best))
+    try:
+        log = evaluate.read_flight(files[0], evaluate.spare_of(best))
+    except AirTouchError as error:
+        raise AirTouchError(str(error).replace("--speed", "--flown-at")) from None
     file = dataset.with_flown_speed(files[0], log)
     detector = HostDetector(best.load(model), sensors.missing_sensors(log))
     board = boards.Board(flight.name, "best", detector.lag_s)
@@ -57,7 +62,7 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
         click.echo("false: " + ", ".join(f"{s / SAMPLE_RATE_HZ:.2f} s" for s in result.score.false))
     figures = evaluate.as_json("best", [result.score], [], detector.lag_s, {})
     title = f"best: lag of {detector.lag_s:.2f} s taken off"
-    table_of.print_table(table_of.console(), {"best": figures}, title)
+    output.print_table(output.console(), {"best": figures}, title)
 
 
 def _in_words(edge) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.vehicle import DEFAULT_VEHICLE
 
 STARTING = "starting; the first time compiles the simulator, which takes a minute"
@@ -20,13 +21,15 @@ STARTING = "starting; the first time compiles the simulator, which takes a minut
 @click.option("--port", default=19850, show_default=True,
               help="UDP port; cflib scans 19850 to 19859. 0: any free one.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
-@click.option("--speed", default=1.0, show_default=True, help="Drone seconds a second.")
+@click.option("--speed", type=Finite(0, 100, min_open=True), default=1.0, show_default=True,
+              help="Drone seconds a second: the pace of the clock, not of the drone.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Name or .toml file.")
 @click.option("--effect", "chosen", multiple=True, metavar="NAME[:P=V...]",
               help="Switch an effect on, as in wind:x=0.3m/s; a scenario's own of that name is replaced.")
 @click.option("--without", multiple=True, metavar="NAME", help="Switch an effect of the scenario off.")
-@click.option("--seed", default=0, show_default=True, help="Of everything that is drawn.")
-@click.option("--flight", default=0, show_default=True, help="Which flight of the scenario is drawn.")
+@seed_option("Of everything that is drawn.")
+@click.option("--flight", type=click.IntRange(0), default=0, show_default=True,
+              help="Which flight of the scenario is drawn.")
 @click.option("--fault", "faults", multiple=True, metavar="FAULT",
               help="loss=0.3, late=50ms, disconnect=T,5s, gap8-reset=T, gap8-silent=T, low-battery=T; T: s "
                    "after take-off, or start.")

@@ -6,10 +6,11 @@ from typing import Any
 import click
 
 from airtouch.cli import Suggesting
-from airtouch.cli.gap.options import check_free, runner, written
-from airtouch.cli.gap.progress import Bar, Steps
-from airtouch.cli.shared import scores
+from airtouch.cli.gap.options import check_all_free, runner, written
+from airtouch.cli.gap.progress import LateBar, StepLines
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import seed_option
 from airtouch.logs.files import make_folder
 
 SEVERITIES_TAKE = "one to two minutes"  #: on two idle processors, 2026-11-26 (host/docs/gap-blind.md)
@@ -25,7 +26,7 @@ def blind() -> None:
 @click.argument("out", type=click.Path(path_type=Path, file_okay=False))
 @click.option("--flights", "-n", default=200, show_default=True, type=click.IntRange(1),
               help="How many flights.")
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the whole set.")
+@seed_option("Of the whole set.")
 @click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Where the key goes; "
               "default: OUT.key.json beside OUT.")
 @click.option("--force", is_flag=True, help="Replace a set in OUT.")
@@ -36,7 +37,7 @@ def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool
     """
     make_folder(out)
     click.echo(f"{flights} flights; first the strengths of every effect, which take {SEVERITIES_TAKE}", err=True)
-    with Bar(line_s=Steps.LINE_S) as bar:
+    with LateBar(line_s=StepLines.LINE_S) as bar:
         from airtouch.gap.sealed import make as sealed
 
         written = sealed.make(out, flights, seed, key=key, force=force, progress=bar)
@@ -60,7 +61,7 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
     from airtouch.gap.sealed import score as sealed
 
     need("plots", "scoring a sealed set")
-    check_free(json_path, plot, force)
+    check_all_free((json_path, plot), force)
     _print_score(sealed.score(folder, answers, key), json_path, plot, force)
 
 
@@ -85,9 +86,9 @@ def blind_run(out: Path, flights: int | None, seed: int | None, workers: int, da
     from airtouch.extras import need
 
     need("plots", "scoring a sealed set")
-    check_free(json_path, None, force)
+    check_all_free([json_path], force)
     if not (out / "sealed.json").exists():  # figures of this check are replaced when it goes on
-        check_free(out / "figures.json", out / "figures.png", force)
+        check_all_free((out / "figures.json", out / "figures.png"), force)
     spread = runner(dask, ()) if dask else None
     make_folder(out)
     from airtouch.gap.sealed import run as check
@@ -95,7 +96,7 @@ def blind_run(out: Path, flights: int | None, seed: int | None, workers: int, da
     if not (out / "sealed.json").exists():
         click.echo(f"{flights or check.FLIGHTS} flights; first the strengths of every effect, which take "
                    f"{SEVERITIES_TAKE}", err=True)
-    with Bar() as bar:
+    with LateBar() as bar:
         figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
@@ -112,9 +113,9 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
         table = Table(*heads)
         for row in rows:
             table.add_row(*row)
-        scores.console().print(table)
+        output.console().print(table)
     if json_path:
-        scores.write_json(json_path, figures, force)
+        output.write_json(json_path, figures, force)
     if plot:
         write_bytes(blind_figures.picture(figures), plot, force)
     written(json_path, plot)

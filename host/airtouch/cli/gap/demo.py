@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.gap.options import check_free
-from airtouch.cli.gap.progress import Steps
-from airtouch.cli.shared import scores
+from airtouch.cli.gap.options import check_all_free
+from airtouch.cli.gap.progress import StepLines
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.typed import typed
 
@@ -27,11 +27,11 @@ def demo_command(out: Path, force: bool) -> None:
     from airtouch.gap import example
 
     report, json_path = out / "report.html", out / "diagnosis.json"
-    check_free(report, json_path, force)
+    check_all_free((report, json_path), force)
     began = time.monotonic()
     line = f"airtouch gap diagnose {example.real()} --baseline {example.FOLDER / 'nominal_*.csv.gz'} --report {report}"
     click.echo(f"This is: {line}")
-    with Steps(began) as say:
+    with StepLines(began) as say:
         say("reading and compiling")
         from airtouch.cli.gap import show
         from airtouch.gap.answer import words
@@ -44,9 +44,9 @@ def demo_command(out: Path, force: bool) -> None:
         diagnosis = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
                              pictures=True)
         say("report")
-        scores.write_json(json_path, diagnosis.plain(), force)
+        output.write_json(json_path, diagnosis.plain(), force)
         gap_report.write_diagnosis(report, diagnosis, command=typed(), force=force)
-    show.diagnosis(scores.console(), diagnosis)
+    show.diagnosis(output.console(), diagnosis)
     true = {name: ", ".join(f"{k} {v:g}" for k, v in p.items()) for name, p in example.answer().items()}
     answer = words.joined([e.name for e in diagnosis.effects]) or diagnosis.verdict
     click.echo(f"\nSwitched on when the flight was made: {'; '.join(f'{n} ({p})' for n, p in true.items())}; found: "

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_free, inputs_and_outputs, runner, written
-from airtouch.cli.gap.progress import Bar
-from airtouch.cli.shared import scores
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_all_free, inputs_and_outputs, runner, written
+from airtouch.cli.gap.progress import LateBar
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -38,7 +38,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     wakes. Prints where the gap lies, which effect causes it and how far it closes; `none` and `unknown` are answers
     too, with exit code 0.
     """
-    check_free(report, json_path, force)
+    check_all_free((report, json_path), force)
     if each and report:
         raise AirTouchError("--report shows one diagnosis; leave --each out")
     if dask and not each:
@@ -47,7 +47,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         raise AirTouchError("--partner is of one flight; leave --each out")
     if partner and not baseline:
         raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
-    with Bar() as bar:
+    with LateBar() as bar:
         from airtouch.cli.gap import files, show
         from airtouch.simulation import effects
 
@@ -66,7 +66,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
             diagnosis = case(logs, progress=bar, pictures=bool(report))
             if json_path:
-                scores.write_json(json_path, diagnosis.plain(), force)
+                output.write_json(json_path, diagnosis.plain(), force)
             if report:
                 from airtouch.report import gap_report
 
@@ -76,7 +76,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     if each:
         diagnosed = _each(flights, case, json_path, runner(dask, effect_files), force)
     else:
-        show.diagnosis(scores.console(), diagnosis)
+        show.diagnosis(output.console(), diagnosis)
     show.left_out([*flights.failed.values(), *nominal.failed.values(), *partners.failed.values()])
     if not diagnosed:
         raise AirTouchError(f"none of {len(flights)} flights can be diagnosed; the reasons are above")
@@ -103,7 +103,7 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
 
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
-    with Bar(len(flights), "diagnosing") as bar:
+    with LateBar(len(flights), "diagnosing") as bar:
         for diagnosis in run(partial(_alone, case), flights):
             if isinstance(diagnosis, AirTouchError):
                 show.left_out([str(diagnosis)])
@@ -115,9 +115,9 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
                           f"{first.probability:.0%}")
             rows.append(diagnosis.plain())
     if rows:
-        scores.console().print(table)
+        output.console().print(table)
     if rows and json_path:
-        scores.write_json(json_path, {"cases": rows}, force)
+        output.write_json(json_path, {"cases": rows}, force)
     return len(rows)
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_free, inputs_and_outputs, written
-from airtouch.cli.gap.progress import Bar
-from airtouch.cli.shared import scores
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_all_free, inputs_and_outputs, written
+from airtouch.cli.gap.progress import LateBar
+from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.typed import typed
 
@@ -22,8 +22,8 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
 
     REAL and --baseline are log files, folders or patterns; give REAL first.
     """
-    check_free(report, json_path, force)
-    with Bar() as bar:
+    check_all_free((report, json_path), force)
+    with LateBar() as bar:
         import airtouch.gap.measurement as measure
         from airtouch.cli.gap import files, show
         from airtouch.gap.sealed import on_cluster
@@ -36,12 +36,12 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     failed = (*flights.failed.values(), *nominal.failed.values())
     measurement = replace(measurement, left_out=(*failed, *measurement.left_out))
     if json_path:
-        scores.write_json(json_path, measurement.plain(), force)
+        output.write_json(json_path, measurement.plain(), force)
     if report:
         from airtouch.report import gap_report
 
         pictures = measure.pictures_of_measurement(measurement, flights, vehicle)
         gap_report.write_measurement(report, measurement, pictures, force=force, command=typed(NAMES_SHOWN))
-    show.measurement(scores.console(), measurement)
+    show.measurement(output.console(), measurement)
     show.left_out(measurement.left_out)
     written(json_path, report)

@@ -1,6 +1,6 @@
 """Options that commands of `airtouch gap` share, and the lines that they all print."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import click
@@ -52,9 +52,9 @@ def inputs_and_outputs(function: Callable) -> Callable:
     return function
 
 
-def check_free(report: Path | None, json_path: Path | None, force: bool) -> None:
+def check_all_free(paths: Iterable[Path | None], force: bool) -> None:
     """Refuse, before the work, to replace a file without --force."""
-    for path in (report, json_path):
+    for path in paths:
         files.check_free(path, force)
 
 

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 PATIENCE_S = 1.0
 
 
-class Steps:
+class StepLines:
     """Prints the seconds since the start and the present step every `line_s`. Call it with each step."""
 
     LINE_S = 1.5
@@ -20,7 +20,7 @@ class Steps:
         self.stopped = threading.Event()
         self.thread = threading.Thread(target=self._tick, daemon=True)
 
-    def __enter__(self) -> "Steps":
+    def __enter__(self) -> "StepLines":
         self.thread.start()
         return self
 
@@ -37,7 +37,7 @@ class Steps:
             click.echo(f"[{time.monotonic() - self.began:4.0f} s] {self.text}", err=True)
 
 
-class Bar:
+class LateBar:
     """A progress bar on stderr that appears when the work takes longer than PATIENCE_S; lines without a terminal.
 
     Call it with a description of each step. total: number of steps, None if unknown. line_s: between two lines without
@@ -54,10 +54,10 @@ class Bar:
         self.task = self.progress.add_task(text, total=total)
         self.timer = threading.Timer(PATIENCE_S, self.progress.start)
         self.timer.daemon = True
-        self.lines = None if console.is_terminal else Steps(time.monotonic(), line_s or self.LINE_S)
+        self.lines = None if console.is_terminal else StepLines(time.monotonic(), line_s or self.LINE_S)
         self._say(text)
 
-    def __enter__(self) -> "Bar":
+    def __enter__(self) -> "LateBar":
         if self.lines:
             self.lines.__enter__()
         else:

@@ -6,9 +6,10 @@ from typing import Any
 import click
 from rich.table import Table
 
-from airtouch.cli.shared import scores as show
+from airtouch.cli.shared import output
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import seed_option
 from airtouch.detector import ablation
 from airtouch.detector.ablation import ABLATIONS
 from airtouch.detector.evaluation.data import dataset
@@ -26,7 +27,7 @@ def _names() -> str:
               help="Run this one; may be given several times. All of them if left out.")
 @click.option("--steps", type=click.IntRange(1), help="Training steps of `best`; its own number if left out.")
 @click.option("--epochs", type=click.IntRange(1), help="Training epochs of `paper`; its own number if left out.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
+@seed_option("Of the training.")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/ablate"), show_default=True,
               help="Folder for finished folds; a second run continues from it.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write every figure to this file.")
@@ -44,16 +45,16 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
         best_options={} if steps is None else {"steps": steps},
         paper_options={} if epochs is None else {"epochs": epochs},
         tell=lambda line: click.echo(line, err=True))
-    screen = show.console()
+    screen = output.console()
     for group in dict.fromkeys(row["group"] for row in results.values()):
         rows = {row["what"]: row for row in results.values() if row["group"] == group}
-        show.print_table(screen, rows, f"ablation: {group}")
+        output.print_table(screen, rows, f"ablation: {group}")
         if any("converged_after_epochs" in f["parameters"] for row in rows.values() for f in row["folds"]):
             screen.print(_training(rows))
         if any("parameter_bytes" in f["parameters"] for row in rows.values() for f in row["folds"]):
             screen.print(_sizes(rows))
     if json_path:
-        show.write_json(json_path, results, force)
+        output.write_json(json_path, results, force)
         screen.print(f"written: {json_path}")
 
 

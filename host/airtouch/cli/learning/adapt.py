@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -28,15 +28,13 @@ MORE = 5  #: further flights whose benefit is estimated
               f"{DEFAULT_VEHICLE}.")
 @click.option("--from", "origin", default="shipped", show_default=True, metavar="MODEL",
               help="Weights to start from: shipped, scratch, or a model file.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; else from the logs.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--hold-out/--no-hold-out", default=True, show_default=True, help="Measure what to expect, by flight.")
 @click.option("--withhold-range", is_flag=True,
               help="Use no labels in the last stage, to measure the benefit of unlabelled flights.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
-              help="Fixes every bit of the result on one machine.")
+@seed_option("Fixes every bit of the result on one machine.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehicle: str | None, origin: str,
             speed: float | None, folds: tuple[int, ...], hold_out: bool, withhold_range: bool, seed: int,

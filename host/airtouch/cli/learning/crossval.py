@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
-from airtouch.cli.shared import scores as show
-from airtouch.cli.shared.flights import SPEED_MPS, need_flights
+from airtouch.cli.shared import output
+from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.detector.best import free_air as free_air_flights
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -33,7 +34,7 @@ DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the fi
 @click.option("--physical-filter/--no-physical-filter", default=True, show_default=True,
               help="Drop edges without an FR-CFAR alert.")
 @click.option("--epochs", type=click.IntRange(1),
-              help="Training epochs; the detector's own number if left out.")
+              help="paper: training epochs; its own number if left out.")
 @click.option("--steps", type=click.IntRange(1), help="best: training steps; its own number if left out.")
 @click.option("--by", type=click.Choice(["fold", "day"]), default="fold", show_default=True,
               help="What is held out together: the manifest's folds, or whole days in five groups.")
@@ -44,9 +45,8 @@ DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the fi
 @click.option("--silence-training", is_flag=True, help="With --silence: remove it from the training flights too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the training.")
+@speed_option
+@seed_option("Of the training.")
 @click.option("--random-windows", is_flag=True,
               help="Also score the paper's random split of windows, which leaks (paper's network only).")
 @click.option("--random-epochs", type=click.IntRange(1), default=60, show_default=True,
@@ -80,6 +80,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
         raise click.UsageError("--steps, --silence and --free-air are for --detector best")
     if random_windows and detector != "paper":
         raise click.UsageError("--random-windows is for --detector paper, whose network it trains")
+    if detector == "best" and epochs:
+        raise click.UsageError("--epochs is for --detector paper and paper-stream; best takes --steps")
     if detector == "baseline" and epochs:
         raise click.UsageError("--epochs is for detectors with a network; the baseline has none")
     files = dataset.collect(flights or [need_flights()], speed)
@@ -100,8 +102,8 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
     result["folds"] = [f.plain() for f in folds]
     if detector == "best":
         result["note"] = DECODER_NOTE
-    screen = show.console()
-    show.print_table(screen, {title: result, **result["by_height"]},
+    screen = output.console()
+    output.print_table(screen, {title: result, **result["by_height"]},
                      f"{title}: {len(folds)} {'folds' if len(folds) > 1 else 'split'} by flight, seed {seed}")
     if "note" in result:
         screen.print(f"note: {result['note']}")
@@ -116,11 +118,11 @@ def command(flights: tuple[Path, ...], detector: str, physical_filter: bool, epo
                      f"after {leak['epochs']} epochs; "
                      f"by flight {result['balanced_accuracy']:.1%}")
     if json_path:
-        show.write_json(json_path, result, force)
+        output.write_json(json_path, result, force)
         screen.print(f"written: {json_path}")
     if ledger:
         note(ledger, title, result)
-    show.left_out(left_out, len(scores))
+    output.left_out(left_out, len(scores))
     if left_out:
         sys.exit(2)
 

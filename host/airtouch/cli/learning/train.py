@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
@@ -44,17 +45,16 @@ from airtouch.logs.flight_log import FlightLog
               help="best: remove this sensor from the flights, for logs that lack it.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
-@click.option("--sparsity", type=click.FloatRange(0, 1, max_open=True),
+@click.option("--sparsity", type=Finite(0, 1, max_open=True),
               help="Share of zeros: paper, in the first dense layer; best, in the dilated layers.")
 @click.option("--block", type=click.Choice(["1", "4"]),
               help="paper: prune single weights or blocks of four; 4 if left out.")
-@click.option("--lambda", "df_lambda", type=click.FloatRange(0), help="paper: weight of the disturbance-force loss.")
+@click.option("--lambda", "df_lambda", type=Finite(0), help="paper: weight of the disturbance-force loss.")
 @click.option("--simulated", type=click.IntRange(1), metavar="N", help="Train on N simulated flights instead.")
 @click.option("--scenario", metavar="NAME", help="With --simulated: what is flown; paper-mixed if left out.")
 @click.option("--without", multiple=True, metavar="EFFECT",
               help="With --simulated: an effect of the scenario to switch off; may be repeated.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True,
-              help="Fixes every bit of the result on one machine, simulated flights included.")
+@seed_option("Fixes every bit of the result on one machine, simulated flights included.")
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
             start: Path | None, labelled: int | None, silence: tuple[str, ...],

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.shared.flights import SPEED_MPS
+from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
@@ -25,13 +25,12 @@ SUMMARY, REPORT = "twin.json", "report.html"
               help="Folder for vehicle.toml, scenario.toml, report.html and the fit.")
 @click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True,
               help="What the fit starts from: a name or a .toml file with mass, size and thrust curve.")
-@click.option("--speed", type=SPEED_MPS, metavar="M/S",
-              help="Commanded speed of flights without one in their manifest; else from the logs.")
+@speed_option
 @click.option("--fold", "folds", type=int, multiple=True, metavar="N",
               help="Only flights of this fold of the manifest; may be repeated.")
 @click.option("--rounds", type=click.IntRange(1), default=12, show_default=True, help="Rounds of simulated flights.")
 @click.option("--batch", type=click.IntRange(40), default=240, show_default=True, help="Simulated flights a round.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes the result.")
+@seed_option("Fixes the result.")
 @click.option("--workers", type=click.IntRange(1), help="Threads; default one a core.")
 @click.option("--resume", is_flag=True, help="Continue a fit that stopped.")
 @click.option("--force", is_flag=True, help="Replace the twin in --out.")
@@ -64,7 +63,7 @@ def command(flights: tuple[Path, ...], out: Path, vehicle: str, speed: float | N
     from airtouch.twin.fitting import calibrate, levers
 
     fit_file = out / calibrate.FIT
-    _check_free(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
+    _check_results(fit_file, [out / name for name in (files.VEHICLE, files.SCENARIO, SUMMARY, REPORT)], resume, force)
     with no_empty_folders(out):
         make_folder(out)
         craft = vehicles.load(vehicle)
@@ -117,7 +116,7 @@ def _say(comparison: Any, flights: int, first_misfit: Any) -> None:
         click.echo(f"  {where}: {what} {difference}, {scatters} scatters, {n} flights")
 
 
-def _check_free(fit_file: Path, results: Sequence[Path], resume: bool, force: bool) -> None:
+def _check_results(fit_file: Path, results: Sequence[Path], resume: bool, force: bool) -> None:
     """Raise AirTouchError for a twin, or files with the names of its results, without --force.
 
     A fit that goes on replaces its own results.

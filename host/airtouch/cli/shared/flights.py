@@ -3,12 +3,8 @@
 import os
 from pathlib import Path
 
-import click
-
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import MANIFEST, flights_in, ignored
-
-SPEED_MPS = click.FloatRange(0, 100, min_open=True)  #: a commanded speed; no source: above any, in m/s
 
 
 def find_flights() -> Path | None:

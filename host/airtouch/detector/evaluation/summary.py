@@ -43,6 +43,24 @@ def summarise(scores: Sequence[FlightScore], *, replicates: int = 2000, seed: in
     }
 
 
+def paired(first: Sequence[FlightScore], second: Sequence[FlightScore], compare: Callable[[Sums, Sums], Sums], *,
+           replicates: int = 2000, seed: int = 0) -> dict[str, tuple[float, float] | None]:
+    """95 % intervals of what `compare` makes of two sets of scores of the same flights, each drawn for both at once.
+
+    compare: the figures of `summarise` by name, shapes (...,), of the first and of the second -> name -> (...,).
+    Flights that one of them lacks are left out; None as in `bootstrap`.
+    """
+    others = {s.flight: s for s in second}
+    pairs = [(s, others[s.flight]) for s in first if s.flight in others]
+    table = {f"{side} {key}": np.array([_totals(pair[side])[key] for pair in pairs], float)
+             for side in (0, 1) for key in _totals_keys()}
+
+    def statistics(sums: Sums) -> Sums:
+        return compare(*(_statistics({key: sums[f"{side} {key}"] for key in _totals_keys()}) for side in (0, 1)))
+
+    return bootstrap(table, statistics, replicates=replicates, seed=seed)
+
+
 def one_a_flight(scores: Iterable[FlightScore]) -> list[FlightScore]:
     """One score a flight, the sum of its scores by several models, so that intervals draw a flight whole."""
     of_flight: dict[str, list[FlightScore]] = {}

@@ -9,6 +9,7 @@ from airtouch.paper_figures.claims import CLAIMS, UNTESTABLE
 from airtouch.paper_figures.figure import Figure, Job, Missing, Verdict
 
 DETECTORS = ("best", "paper")
+BOTH = "the paper's method and best, each"  #: what some verdicts are on
 HEIGHTS = ("paper-4cm", "paper-9cm", "paper-12cm")
 WINDS_MPS = CLAIMS["wind"].values
 #: (detector, height, "simulated" or "recorded") -> scores of its flights
@@ -97,7 +98,7 @@ def by_angle(job: Job) -> Figure:
                 rows[name, angle] = row = summary.summarise(group)
                 table.append(words.table_row(f"{name}, {angle:+.0f}°", row, detector=name, angle_deg=angle))
     groups = {name: {size: [s for s in flights if s.condition.height == "low"
-                            and abs(s.condition.angle_deg or 0.0) == size]
+                            and s.condition.angle_deg in (size, -size)]
                      for size in (0.0, 10.0, 20.0)}
               for name, flights in scores.items()}
     by_size = {name: {size: summary.summarise(group) for size, group in sizes.items()}
@@ -109,9 +110,10 @@ def by_angle(job: Job) -> Figure:
 
     both = "; ".join(text(name) for name in reversed(DETECTORS))
     verdicts = {"angle": words.verdict(words.worse(by_size["paper"][0.0], by_size["paper"][20.0]), both),
-                "angle-sides": words.verdict(*_sides(rows))}
+                "angle-sides": words.verdict(*_sides(rows), BOTH)}
+    counted = [s for group in groups["best"].values() for s in group]
     caption = ("Low flights alone (2.5 cm over the platform), for the others came straight on. "
-               + recorded.sample_sentence(job, len(scores["best"]), sum(len(s.edges) for s in scores["best"])))
+               + recorded.sample_sentence(job, len(counted), sum(len(s.edges) for s in counted)))
 
     def draw(canvas):
         for axes, name in zip(canvas.subplots(1, 2, sharey=True), DETECTORS, strict=True):
@@ -157,7 +159,7 @@ def wind(job: Job) -> Figure:
     caption = (f"Simulated: {2 * count} flights a speed, 4 cm over the platform, half with wind from the front and "
                "half from the left; the shipped networks. The wind is steady, as the paper's. The recorded flights "
                "have one with a fan.")
-    verdict = words.verdict(words.all_of(same.values()), text)
+    verdict = words.verdict(words.all_of(same.values()), text, BOTH)
     if calm["paper"]["missed"] is not None and calm["paper"]["missed"] > 0.5 and same["best"] is not False:
         verdict = Verdict(UNTESTABLE, f"the paper's method misses most edges without wind already; {text}")
 

@@ -19,6 +19,7 @@ PAPER_CAMERA = (320, 320)  #: rows and columns that the paper states for its cam
 PAPER_FRAME_BITS = 8 * PAPER_CAMERA[0] * PAPER_CAMERA[1]
 WINDOW_BITS = 32 * 3 * DEFAULT.feature_window  #: three channels of features in float
 FLOPS_A_MAC = 2
+NETWORKS = "the paper's network and the camera's (TEED's structure)"  #: what verdicts here are on
 
 
 def resources(job: Job) -> Figure:
@@ -82,14 +83,14 @@ def _flops(n: _Counts) -> Verdict:
         f"0.28 counts these), {n.multiplications / 1e6:.2f} as shipped; TEED at 320 x 320 "
         f"{FLOPS_A_MAC * vision / 1e6:,.0f} million FLOPs, {vision / 1e6:,.0f} million multiply-accumulates; 3900 "
         f"million FLOPs are those of an image of {side:.0f} x {side:.0f}. 0.28 of 3900 is 0.007 %, as the text says, "
-        "not the table's 0.07 %")
+        "not the table's 0.07 %", NETWORKS)
 
 
 def _parameters(n: _Counts) -> Verdict:
     theirs, said = CLAIMS["parameters"].values
     return words.verdict(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
                          f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
-                         f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float")
+                         f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float", NETWORKS)
 
 
 def _memory() -> Verdict:
@@ -98,7 +99,7 @@ def _memory() -> Verdict:
     return words.verdict(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
                          f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band "
                          f"power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less "
-                         "than a million, not millions")
+                         "than a million, not millions", "the paper's method and the camera")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:

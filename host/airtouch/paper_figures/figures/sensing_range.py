@@ -117,7 +117,7 @@ def _at_3_m(rows: list[dict[str, Any]], claimed_m: float) -> Verdict:
                          "by three curves and two readings of the propeller's size; with "
                          f"{100 * IDEAL:.2f} %, the least that a second of white noise allows, up to {farthest:.1f} m "
                          f"at most. At 3 m {100 * max(r['lift_at_3_m_share'] for r in rows):.2f} % of the weight is "
-                         "left at most. Nothing was flown")
+                         "left at most. Nothing was flown", "curves of lift")
 
 
 def _small(rows: list[dict[str, Any]]) -> Verdict:

@@ -1,5 +1,6 @@
 """Table 1: power of each stage, measured if there is an INA219 log, otherwise estimated."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +24,41 @@ def measured_power(log: Path) -> Figure:
         trace = ina219.parse(log.read_text(encoding="utf-8", errors="replace"), str(log))
     except OSError as error:
         raise AirTouchError(f"{log}: cannot be read: {error.strerror}") from None
-    powers = ina219.by_stage(trace, tuple(stages.PAPER_MW))
-    if not powers:
-        raise AirTouchError(f"{log}: no column of stages; the sketch in tools/power writes one")
+    measured = ina219.by_stage(trace, tuple(stages.PAPER_MW))
+    if lacking := [name for name in stages.PAPER_MW if name not in measured]:
+        raise AirTouchError(f"{log}: no stage {', '.join(lacking)}; Table 1 needs {', '.join(stages.PAPER_MW)}; "
+                            "the sketch in tools/power writes a column of stages")
+    powers = {name: measured[name] for name in stages.PAPER_MW}
+    others = [name for name in measured if name not in powers]
     rows = [{"what": stages.NAMES.get(name, name), "mw": mw, "low_mw": mw - half, "high_mw": mw + half,
              "paper_mw": stages.PAPER_MW.get(name), "seconds": powers[name].seconds, "lines": powers[name].lines}
             for name, (mw, half) in ina219.added_power(powers).items()]
-    last = list(powers.values())[-1]
-    total, half = last.mw, last.half_mw
-    verdicts = {"power": words.verdict(total - half <= CLAIMS["power"].values[0],
-                                      f"total {total:.1f} mW [{total - half:.1f}, {total + half:.1f}] over "
-                                      f"{last.seconds:.0f} s"),
-                "negligible": _negligible(total - next(iter(powers.values())).mw, "measured")}
-    return Figure("Power", rows, f"Measured with an INA219: {log.name}; 95 % intervals from blocks of 1 s.",
-                  verdicts, lambda canvas: _draw(canvas, rows))
+    total, idle = powers["network"], powers["baseline"]  # a stage runs on top of those before it
+    added = total.mw - idle.mw, math.hypot(total.half_mw, idle.half_mw)
+    of_paper = sum(stages.PAPER_MW.values()) - stages.PAPER_MW["baseline"]
+    same = words.all_of([_same(total.mw, total.half_mw, CLAIMS["power"].values[0]), _same(*added, of_paper)])
+    verdicts = {"power": words.verdict(same, f"total {_interval(total.mw, total.half_mw)}, of which "
+                                             f"{_interval(*added)} for AirTouch, over {total.seconds:.0f} s",
+                                      "the paper's stages"),
+                "negligible": _negligible(*added, "measured")}
+    caption = (f"Measured with an INA219: {log.name}; 95 % intervals from blocks of 1 s."
+               + (f" Left out, stages that the paper does not have: {', '.join(others)}." if others else ""))
+    return Figure("Power", rows, caption, verdicts, lambda canvas: _draw(canvas, rows))
+
+
+def _same(mw: float, half_mw: float, paper_mw: float) -> bool | None:
+    """Whether a measured power is the paper's; None for undecided, as with an interval that is unknown (NaN).
+
+    Yes: the 95 % interval lies within ERROR_MARGIN of the paper's. No: it leaves the paper's out.
+    """
+    off = abs(mw - paper_mw)
+    return words.decided(off + half_mw <= words.ERROR_MARGIN * paper_mw, off > half_mw)
+
+
+def _interval(mw: float, half_mw: float) -> str:
+    if math.isnan(half_mw):
+        return f"{mw:.1f} mW [interval unknown: log each stage for some seconds]"
+    return f"{mw:.1f} mW [{mw - half_mw:.1f}, {mw + half_mw:.1f}]"
 
 
 def estimated_power() -> Figure:
@@ -53,18 +75,21 @@ def estimated_power() -> Figure:
     verdicts = {"power": Verdict(UNTESTABLE, f"no meter here; the work itself is estimated at {low:.1f} to {high:.1f} "
                                              "mW for the paper's stages (43 mW there), from counted instructions, "
                                              "without idle power, clocks and regulators"),
-                "negligible": _negligible(high, "estimated, at most")}
+                "negligible": _negligible(high, 0.0, "estimated, at most")}
     return Figure("Power", rows, "An estimate, nothing was measured: instructions counted in the emulator times "
                                  "energy an instruction, 100 steps a second (power.md). A log of an INA219 is read "
                                  "with --power-log.", verdicts,
                   lambda canvas: _draw(canvas, rows))
 
 
-def _negligible(mw: float, source: str) -> Verdict:
-    share = mw / CLAIMS["negligible"].values[0]
-    return words.verdict(share < NEGLIGIBLE,
-                         f"{source} {mw:.1f} mW are {100 * share:.1f} % of the paper's 3000 mW; the paper's own 43 mW "
-                         "are 1.4 %. The propellers' power was not measured here")
+def _negligible(mw: float, half_mw: float, source: str) -> Verdict:
+    """Whether a power is small beside the propellers'; undecided too where the log says that it is less than 0."""
+    propellers = CLAIMS["negligible"].values[0]
+    low, high = mw - half_mw, mw + half_mw
+    answer = words.decided(0.0 <= high < NEGLIGIBLE * propellers, low >= NEGLIGIBLE * propellers)
+    return words.verdict(answer,
+                         f"{source} {mw:.1f} mW are {100 * mw / propellers:.1f} % of the paper's 3000 mW; the paper's "
+                         "own 43 mW are 1.4 %. The propellers' power was not measured here", "the paper's stages")
 
 
 def _draw(canvas: Any, rows: list[dict[str, Any]]) -> None:
