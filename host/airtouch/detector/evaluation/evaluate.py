@@ -18,7 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
-from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
 MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
@@ -76,10 +76,9 @@ def check(log: FlightLog, spare: int = 0) -> None:
         if missing > MOST_MISSING:
             raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
                                 "log the flight again or leave it out")
-    flying = logs.airborne(log)
+    flying, evidence = sensors.airborne_by(log)
     if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
-        raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above {DEFAULT.arm_pwm:g} for less than "
-                            "1 s)")
+        raise AirTouchError(f"{log.source}: no flight in this log (less than 1 s of {evidence})")
     used = np.where(finite, channels, 0.0)[flying]
     for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
         if spread == 0.0:
@@ -114,7 +113,7 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
 def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
     """The score of a trace that the detector gave with this model."""
     condition = with_flown_speed(file, log).condition
-    score = score_flight(file.path.name, condition, truth(log), logs.airborne(log), trace,
+    score = score_flight(file.path.name, condition, truth(log), sensors.airborne_by(log)[0], trace,
                          detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)
