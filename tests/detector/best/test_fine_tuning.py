@@ -67,6 +67,15 @@ def test_pseudo_labels_are_the_detections_without_the_lag(small):
     assert [e.kind for e in labels] == [e.kind for e in edges]
 
 
+def test_pseudo_labels_of_a_log_without_a_sensor_are_less_the_lag_of_the_model_that_serves_it(small):
+    keen = replace(small, metadata={**small.metadata, "lag_s": 0.5, "decoder_without": {}, "decoder": {
+        **small.metadata["decoder"], "entry_score": -6.0, "exit_score": -6.0}})
+    log = sensors.without(blind(made_flight(7)), ("motors",))
+    ((*labels,),) = best.pseudo_labels([log], replace(small, spares={"motors": keen}))
+    edges = best.run(log, keen).edges
+    assert edges and [e.sample for e in labels] == [max(e.sample - 50, 0) for e in edges]
+
+
 def test_free_air_is_drawn_and_has_no_goals():
     from airtouch.detector.best import batches
 
