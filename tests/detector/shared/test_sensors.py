@@ -82,6 +82,14 @@ def test_a_log_without_motors_and_down_range_is_scored_where_its_rates_show_flig
         evaluate.check(parked, 1)
 
 
+def test_a_stuck_sensor_with_a_lost_sample_is_still_stuck():
+    log = made_flight(4)
+    stuck = np.full(len(log), 0.25)
+    stuck[[700, 1300]] = np.nan
+    with pytest.raises(AirTouchError, match="gyro y is constant"):
+        evaluate.check(log.with_columns({"gyro_y_radps": stuck}))
+
+
 def test_flight_is_told_causally():
     gyro = made_flight(5).stack(GYRO)
     assert np.array_equal(sensors.is_flying(gyro[:1000]), sensors.is_flying(gyro)[:1000])

@@ -80,8 +80,8 @@ def check(log: FlightLog, spare: int = 0) -> None:
     if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
         raise AirTouchError(f"{log.source}: no flight in this log (less than 1 s of {evidence})")
     used = np.where(finite, channels, 0.0)[flying]
-    for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
-        if spread == 0.0:
+    for name, values, logged in zip(names, used.T, finite[flying].T, strict=True):
+        if not logged.any() or np.ptp(values[logged]) == 0.0:
             raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
     for rate, acceleration in zip(RATES, ACCELERATIONS, strict=True):
         if {rate, acceleration} <= set(names):
