@@ -16,7 +16,10 @@ from airtouch.reference.motion_channels import CHANNEL_TABLE, NAMES, MotionConfi
 #: Sign of each column in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
 MIRROR = np.array([*(channel.mirror for channel in CHANNEL_TABLE), 1], dtype=np.float32)
 FORWARD, LEFT, EMPTY = (NAMES.index(name) for name in ("ax", "ay", "zero"))
-AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and after the last one where it may end
+#: samples before take-off at which the first of the crops that lie anywhere begins; one of take-off begins up to
+#: BEHIND before that
+AHEAD = 300
+BEHIND = 150  #: samples after the last one of the flight up to which a crop of landing may end
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,8 @@ def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.ran
     if len(flight.edges) and rng.random() < recipe.edge_share:
         ahead = rng.uniform(1.1 * recipe.warm_up, 0.93 * recipe.crop) * speed
         return float(flight.edges[rng.integers(len(flight.edges))]) - ahead
-    # conditional on not being an edge crop, so that `phases` is a share of all crops
+    # conditional on not being an edge crop, so that `phases` is a share of all crops of a flight with edges; of a
+    # flight without edges every crop comes here, and the share is phases / (1 - edge_share)
     if rng.random() < recipe.phases / max(1.0 - recipe.edge_share, recipe.phases):
         return first - BEHIND * rng.random() if rng.random() < 0.5 else final + BEHIND * rng.random()
     return rng.uniform(min(first, final), max(first, final))

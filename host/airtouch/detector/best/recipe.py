@@ -54,7 +54,9 @@ class Recipe:
     silent_acceleration: float = 0.15  #: share of the crops without acceleration, so that the network runs without it
     silent_rates: float = 0.05  #: share of the crops without rates
     silent_motors: float = 0.1  #: share of the crops without motors
-    phases: float = 0.15  #: share of the crops that hold take-off or landing
+    #: share of the crops of flights with edges that are drawn at take-off or landing; of flights without edges, divided
+    #: by 1 - edge_share
+    phases: float = 0.15
     free_air_share: float = 0.2  #: share of the crops from flights without edges, where there are such
 
     @property
