@@ -25,8 +25,14 @@ from airtouch.detector.paper.model import Model
 from airtouch.detector.shared import training_set
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, printable
-from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
-from airtouch.kernels.rolling import probability_of_samples
+from airtouch.kernels.network import (
+    arena_bytes,
+    infer_float,
+    parameter_bytes,
+    platform_probability,
+    probability_of_flight,
+)
+from airtouch.kernels.rolling import answers_of_samples, held, probability_of_samples, rolling_size
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.networks.int8_network import multiplications
@@ -69,11 +75,29 @@ def run_float(log: FlightLog, model: Model | None = None) -> Trace:
     """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
     model = model or load(None)
     features = flight_features(log, parameters=decoding_settings(model)[0])
-    windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
-    logits = infer_float(model.float_layers, windows).astype(np.float64)
-    probability = np.full(len(log), np.nan)
-    probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
-    return _trace(log, model, features, probability)
+    return _trace(log, model, features, _float_probability(model, features.fused))
+
+
+def _float_probability(model: Model, fused: np.ndarray) -> np.ndarray:
+    """`probability_of` by the float network, at the samples at which the int8 network answers."""
+    probability = np.full(len(fused), np.nan)
+    if model.scale is None:
+        windows, at = feature_windows(fused, DEFAULT.feature_window)
+    else:
+        valid = answers_of_samples(model, fused, stride(model))[1]
+        windows, at = _rolling_windows(model, fused, np.flatnonzero(valid))
+    probability[at] = platform_probability(infer_float(model.float_layers, windows), 1.0)
+    return probability if model.scale is None else held(probability, valid, fused)
+
+
+def _rolling_windows(model: Model, fused: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The windows (k, rows, c) whose answers the rolling network gives at the samples (k,), and these samples.
+
+    A window ends some samples later, of which the answer does not depend: they are as the last one before them.
+    """
+    ahead = rolling_size(model.int8, stride(model)).ahead
+    rows = np.minimum(at[:, None] + ahead + np.arange(1 - DEFAULT.feature_window, 1), at[:, None])
+    return model.scale.apply(fused)[rows], at
 
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
