@@ -85,19 +85,19 @@ def _float_probability(model: Model, fused: np.ndarray) -> np.ndarray:
         windows, at = feature_windows(fused, DEFAULT.feature_window)
     else:
         valid = answers_of_samples(model, fused, stride(model))[1]
-        windows, at = _rolling_windows(model, fused, np.flatnonzero(valid))
+        windows, at = _rolling_windows(model, model.scale.apply(fused), np.flatnonzero(valid))
     probability[at] = platform_probability(infer_float(model.float_layers, windows), 1.0)
     return probability if model.scale is None else held(probability, valid, fused)
 
 
-def _rolling_windows(model: Model, fused: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The windows (k, rows, c) whose answers the rolling network gives at the samples (k,), and these samples.
+def _rolling_windows(model: Model, inputs: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The windows (k, rows, c) whose answers a rolling network gives at the samples (k,) of (n, c), and these samples.
 
     A window ends some samples later, of which the answer does not depend: they are as the last one before them.
     """
     ahead = rolling_size(model.int8, stride(model)).ahead
     rows = np.minimum(at[:, None] + ahead + np.arange(1 - DEFAULT.feature_window, 1), at[:, None])
-    return model.scale.apply(fused)[rows], at
+    return inputs[rows], at
 
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
