@@ -7,6 +7,7 @@ from airtouch.detector.best.operations import CONV, HEAD
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
+from airtouch.vehicle import Vehicle
 
 CHANNELS = len(NAMES)  #: values a sample
 ROW_STRIDE = 2  #: samples between two rows that are computed: 50 Hz
@@ -58,6 +59,8 @@ class Recipe:
     #: by 1 - edge_share
     phases: float = 0.15
     free_air_share: float = 0.2  #: share of the crops from flights without edges, where there are such
+    #: its thrust curve, gravity and PWM in the air are those of the motion channels; None for the default vehicle's
+    vehicle: Vehicle | None = None
 
     @property
     def graph(self) -> tuple[StreamLayer, ...]:
@@ -80,5 +83,7 @@ class Recipe:
     def motion(self) -> MotionConfig:
         """The channels' settings: a muted channel has no bounds to its nominal amplitude."""
         config = MotionConfig()
+        if self.vehicle is not None:
+            config = replace(config, vehicle=self.vehicle, arm_pwm=self.vehicle.arm_pwm)
         scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
         return replace(config, scale=scale)
