@@ -87,7 +87,7 @@ def probability(model: Model, windows: np.ndarray) -> np.ndarray:
 
 
 def platform_probability(logits: np.ndarray, scale: float) -> np.ndarray:
-    """P(over a platform), (n,): softmax of the second of two int8 logits, (n, 2), which are in units of `scale`."""
+    """P(over a platform), (n,): softmax of the second of two logits, (n, 2), in units of `scale`."""
     difference = logits[:, 1].astype(np.float64) - logits[:, 0]
     return 1.0 / (1.0 + np.exp(-scale * difference))
 
