@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch import kernels, logs
-from airtouch.detector.best.outputs import OUTPUTS, goals
+from airtouch.detector.best.outputs import OUTPUTS, training_targets
 from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE, Recipe
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.shared import sensors
@@ -26,12 +26,12 @@ BEHIND = 150  #: samples after the last one of the flight up to which a crop of 
 class TrainingFlight:
     """One training flight of n samples.
 
-    x: (n, channels). goals: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
+    x: (n, channels). targets: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
     against the others. silent: channels of sensors that it lacks, which stay exactly 0.
     """
 
     x: np.ndarray
-    goals: np.ndarray
+    targets: np.ndarray
     edges: np.ndarray
     airborne: np.ndarray
     weight: float = 1.0
@@ -57,14 +57,14 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
     edges = logs.true_edges(log) if edges is None else edges
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
     silent = {channel for sensor in sensors.missing_sensors(log) for channel in sensors.CHANNELS_OF[sensor]}
-    return TrainingFlight(x, goals(over_platform(edges, len(log)), edges, recipe),
+    return TrainingFlight(x, training_targets(over_platform(edges, len(log)), edges, recipe),
                           np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
                           tuple(sorted(silent)))
 
 
 def batch(flights: Sequence[TrainingFlight], recipe: Recipe, rng: np.random.Generator,
           free_air: Sequence[TrainingFlight] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Inputs (batch, crop, channels) and goals (batch, crop / stride, outputs), float32.
+    """Inputs (batch, crop, channels) and targets (batch, crop / stride, outputs), float32.
 
     free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
     """
@@ -107,7 +107,7 @@ def _crop(flight: TrainingFlight, recipe: Recipe, rng: np.random.Generator) -> t
     low = np.minimum(t.astype(int), last - 1)
     part = (t - low)[:, None].astype(np.float32)
     x = flight.x[low] * (1 - part) + flight.x[low + 1] * part
-    return x, flight.goals[np.round(t[::ROW_STRIDE]).astype(int)]
+    return x, flight.targets[np.round(t[::ROW_STRIDE]).astype(int)]
 
 
 def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:

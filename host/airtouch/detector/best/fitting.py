@@ -49,8 +49,8 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
                            free_air=[flight_of(log, recipe, ()) for log in settings.free_air],
                            start=start.weights if start else None,
                            resume=_resume_file(examples, recipe, settings, seed))
-    int8, tflite = quantisation.quantise(weights, recipe,
-                                         quantisation.windows([f.x for f in training_flights], recipe))
+    int8, tflite = quantisation.quantise_network(weights, recipe,
+                                                 quantisation.windows([f.x for f in training_flights], recipe))
     model = BestModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": settings.command, "seed": seed, "lag_s": 0.0,
         "sigma_s": detector.TIMING_SIGMA_S, **_decoders(settings.decoder, start),

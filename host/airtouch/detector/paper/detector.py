@@ -38,10 +38,10 @@ from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.networks.int8_network import multiplications
 
 #: The grid of decoding settings that `tune` searches. The paper gives none, so it is chosen from the training flights.
-ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  #: P(over a platform) at which an entry is reported
-EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)  #: P(over a platform) at which an exit is reported
-DWELL = (25, 50, 100, 150)  #: samples (10 ms) between two edges, at least
-HOLD = (25, 50, 100, 200)  #: samples for which an alert of FR-CFAR confirms an edge
+ENTRY_GRID = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  #: P(over a platform) at which an entry is reported
+EXIT_GRID = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)  #: P(over a platform) at which an exit is reported
+DWELL_GRID = (25, 50, 100, 150)  #: samples (10 ms) between two edges, at least
+HOLD_GRID = (25, 50, 100, 200)  #: samples for which an alert of FR-CFAR confirms an edge
 #: One flight: P(over a platform), whether edges may be reported, alert of FR-CFAR; (n,) each.
 DecodingInputs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -170,7 +170,8 @@ def candidates(physical_filter: bool) -> list[Parameters]:
     """The decoding settings that tuning chooses from."""
     return [
         replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell, alert_hold=hold)
-        for entry, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, HOLD if physical_filter else HOLD[:1])
+        for entry, leave, dwell, hold in itertools.product(
+            ENTRY_GRID, EXIT_GRID, DWELL_GRID, HOLD_GRID if physical_filter else HOLD_GRID[:1])
         if leave < entry
     ]
 
