@@ -124,6 +124,10 @@ def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         at.gap.measure(of_unknown, "crazyflie-2.1-flow")
+
+
+def test_a_log_without_a_vehicle_is_measured_as_the_default_with_a_warning(log):
+    with pytest.warns(UserWarning, match="names no vehicle; crazyflie-2.1-flow is assumed, vehicle names another"):
         at.gap.measure(log.with_columns({}, vehicle=""))
 
 

@@ -1,7 +1,6 @@
-"""The wheel: built from this tree it holds all that detecting, diagnosing and simulating read, and works away from the
-tree."""
+"""The wheel: built from the archive of sources of this tree it holds all that detecting, diagnosing and simulating
+read, and works away from the tree."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -24,13 +23,26 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
+def sdist(tmp_path_factory):
+    """The archive of sources, of a tree in which nothing was built before: setuptools adds what an old list names."""
+    out = tmp_path_factory.mktemp("sdist")
+    tree = out / "tree"
+    for name in ("firmware", "gap8", "host"):
+        shutil.copytree(ROOT / name, tree / name, symlinks=True,
+                        ignore=shutil.ignore_patterns("*.egg-info", "__pycache__", "*.so"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy2(ROOT / name, tree / name)
+    build = f"from setuptools import build_meta; build_meta.build_sdist({str(out)!r})"
+    subprocess.run([sys.executable, "-c", build], cwd=tree, check=True, timeout=600, stdout=subprocess.DEVNULL)
+    (path,) = out.glob("airtouch-*.tar.gz")
+    return path
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist, tmp_path_factory):
     out = tmp_path_factory.mktemp("wheel")
-    settings = out / "build.cfg"  # a build folder of its own: that of the tree may hold modules that are gone
-    settings.write_text(f"[build]\nbuild_base = {out / 'build'}\n")
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", out,
-                    ROOT],
-                   check=True, timeout=600, env={**os.environ, "DIST_EXTRA_CONFIG": str(settings)})
+                    sdist], check=True, timeout=600)
     (path,) = out.glob("airtouch-*.whl")
     return path
 

@@ -2,6 +2,8 @@
  * @file stream_detector.h
  * The streaming detector in one struct: motion channels, int8 network, decoder.
  * One step a sample at 100 Hz; the network runs on every stride-th one.
+ * The network's layers are those of gap8/kernels, which are plain C wherever there is no GAP8: so both processors
+ * compute the same bits, and the STM32 can go on where the GAP8 stopped.
  *
  * Target: C11 with IEEE single precision, on any processor; a FPU helps. Build with -ffp-contract=off for the
  *   desktop's bits.

@@ -177,7 +177,8 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
     """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
     vehicle: a built-in name or .toml file; that of the first log if left out, and crazyflie-2.1-flow, with a warning,
-    where no file is known of that. baseline: nominal flights. without: effects to exclude. report: HTML file to write.
+    where it names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
+    report: HTML file to write.
     The result's `plain()` is the JSON of `airtouch gap diagnose`.
     Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
     """
@@ -274,7 +275,7 @@ def _several(flights: Any) -> list[Any]:
 
 
 def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
-    """The named vehicle, or that of the first log for None, with a warning where no file is known of it."""
+    """The named vehicle, or that of the first log for None, with a warning where it was assumed."""
     from airtouch import vehicle as vehicles
 
     if named is None:

@@ -116,13 +116,28 @@ def argument_of(vehicle: Vehicle) -> str:
 
 
 def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
-    """The vehicle that a log's metadata name, else the default; and a warning if no file is known of the one named."""
+    """The vehicle that a log's metadata name, else the default; and a warning where it was assumed.
+
+    It is assumed where the log names none, where no file is known of the one named, and where the reader set it for
+    want of a name (`assumed_vehicle`).
+    """
     name = str(meta.get("vehicle") or "")
-    try:
-        return load(name or DEFAULT_VEHICLE), None
-    except AirTouchError:
+    if unknown_name(meta):
         return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, of which no file is known; {DEFAULT_VEHICLE} "
                                        "is used, --vehicle names another")
+    craft = load(name or DEFAULT_VEHICLE)
+    assumed = not name or meta.get("assumed_vehicle") == name
+    return craft, f"the log names no vehicle; {craft.name} is assumed, --vehicle names another" if assumed else None
+
+
+def unknown_name(meta: Mapping[str, Any]) -> str:
+    """The vehicle that a log's metadata name where no file is known of it, else ""."""
+    name = str(meta.get("vehicle") or "")
+    try:
+        load(name or DEFAULT_VEHICLE)
+    except AirTouchError:
+        return name
+    return ""
 
 
 def parse(text: str, source: str) -> Vehicle:

@@ -19,12 +19,13 @@ class FakeCraft:
     """See `airtouch.crazyflie.flight.Craft`."""
 
     def __init__(self, loss=0.0, silent=(), volts=4.0, busy=False, dead_link_at=None, restart_at=None,
-                 platform=(1.0, 2.0), seed=1, uptime_s=0, falls=True, mute=False):
+                 platform=(1.0, 2.0), seed=1, uptime_s=0, falls=True, mute=False, unheard=()):
         self.samples, self.answers, self.lost = queue.SimpleQueue(), queue.SimpleQueue(), threading.Event()
         self.uptime_ms = 1000 * uptime_s  #: that its clock shows at the start
         self.loss, self.silent, self.volts, self.busy = loss, silent, volts, busy
         self.dead_link_at, self.restart_at, self.platform = dead_link_at, restart_at, platform
         self.falls = falls  #: at restart_at; otherwise only its clock starts again
+        self.unheard = unheard  #: when commands reach it and its packets do not come: its log blocks are gone
         self.mute = mute  #: from restart_at on it sends no state
         self.heard: list = []  #: commands that reached it: (drone's clock, command)
         self.random = random.Random(seed)
@@ -111,7 +112,8 @@ class FakeCraft:
     def _packet(self, index):
         t = index * 0.01
         self._move(t)
-        if self.lost.is_set() or any(a <= t < b for a, b in self.silent) or self.random.random() < self.loss:
+        unheard = any(a <= t < b for a, b in (*self.silent, *self.unheard))
+        if self.lost.is_set() or unheard or self.random.random() < self.loss:
             return
         stamp = self.uptime_ms + index * 10
         if self.restart_at is not None and t > self.restart_at:

@@ -150,15 +150,18 @@ def test_thirty_percent_packet_loss_of_everything(serve, hop, cache, tmp_path):
     assert "messy" in (tmp_path / "manifest.csv").read_text()
 
 
-def test_a_five_second_drop_in_mid_sweep(serve, hop, cache, tmp_path, guards):
-    with serve("disconnect=4,5s") as virtual:
+@pytest.mark.parametrize("seconds", [5.0, 7.3, 20.0])
+def test_a_drop_in_mid_sweep_ends_in_a_landing(serve, hop, cache, tmp_path, guards, seconds):
+    with serve(f"disconnect=4,{seconds:g}s") as virtual:
         result = fly(virtual, hop, cache, tmp_path)
         assert result.exit_code == 1 and "link lost" in result.output, result.output
         assert comes_to_rest(virtual) and guards[0].pipe.getvalue() == b"10"
     log = logs.read(tmp_path / "hop_0001.csv.gz")
-    assert log.meta["longest_gap_s"] >= 4.9 and "link lost" in log.meta["ended"]
+    assert log.meta["longest_gap_s"] >= seconds - 0.1 and "link lost" in log.meta["ended"]
     middle = int(np.argmax(np.diff(log["t_s"])))
     assert middle > 200 and len(log) - middle > 20  # before the drop and after it
+    down = np.flatnonzero(log["z_m"] > 0.1)[-1] - np.flatnonzero(log["z_m"] > 0.3)[-1]
+    assert down > 30  # samples from 0.3 to 0.1 m; a fall takes some 13
 
 
 def test_a_drop_after_which_the_drone_has_forgotten_its_log_blocks(serve, hop, cache, tmp_path):

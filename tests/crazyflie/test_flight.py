@@ -94,6 +94,38 @@ def test_a_drop_at_the_end_of_a_leg_delays_the_next(tmp_path):
     assert landed - went[0] == pytest.approx(11.0, abs=0.5)  # the whole leg at its own speed, then a second of hover
 
 
+@pytest.mark.parametrize("until_s", [14.0, 15.0, 16.5, 20.0, 25.0, 60.0])
+def test_however_long_the_silence_the_drone_lands_when_it_is_heard_again(tmp_path, until_s):
+    craft = FakeCraft(silent=[(9.0, until_s)])
+    _, _, ended = fly(craft, tmp_path)
+    assert ended == "link lost for 3.0 s" and not craft.flying and not craft.crashed
+    assert kinds(craft)[2:4] == ["land", "stop"]
+    assert next(t for t, c in craft.heard if c.kind == "land") == pytest.approx(until_s, abs=0.4)
+
+
+def test_a_command_that_fell_into_a_silence_is_sent_when_it_is_over(tmp_path):
+    craft = FakeCraft(silent=[(5.9, 8.8)])  # the "go" of 6 s; at most 8 tries of 0.3 s would count as accepted
+    _, _, ended = fly(craft, tmp_path)
+    went = [t for t, c in craft.heard if c.kind == "go"]
+    assert ended == "as planned" and len(went) == 1 and 8.8 <= went[0] < 9.2 and not craft.crashed
+
+
+def test_a_drone_that_never_comes_back_is_given_up_after_a_minute(tmp_path):
+    craft = FakeCraft(silent=[(9.0, 1e9)])
+    flight, _, ended = fly(craft, tmp_path)
+    assert ended == "link lost for 3.0 s; NO CONTACT for 60 s, land by hand" and not flight.landed
+    assert craft.clock() == pytest.approx(9.0 + 3.0 + 60.0, abs=0.5)
+
+
+@pytest.mark.parametrize("dead_link", [False, True])
+def test_a_drone_that_restarted_in_a_silence_gets_no_command_before_it_is_heard(tmp_path, dead_link):
+    craft = FakeCraft(restart_at=12.0, silent=[(9.0, 12.5)], unheard=[(12.5, 14.0)], uptime_s=60,
+                      dead_link_at=12.6 if dead_link else None)
+    _, _, ended = fly(craft, tmp_path)
+    assert ended == "the drone restarted in flight" and not craft.crashed
+    assert kinds(craft) == ["take-off", "go"]
+
+
 def test_a_broken_link_is_opened_again_to_land(tmp_path):
     craft = FakeCraft(dead_link_at=9.0)
     flight, book, ended = fly(craft, tmp_path)

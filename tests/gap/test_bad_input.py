@@ -78,6 +78,24 @@ def test_a_vehicle_file_without_a_parameter_names_it(tmp_path):
         vehicles.load(path)
 
 
+def stuck(log, name):
+    """The log, under a name of its own, with a roll rate that stands still for 3 s, and a voltage that is none."""
+    rate = log["gyro_x_radps"].copy()
+    rate[400:700] = rate[400]
+    columns = {**log.columns, "gyro_x_radps": rate, "vbat_V": np.full(len(log), np.nan)}
+    return FlightLog(columns, {**log.meta, "source": f"flights/{name}.csv"})
+
+
+def test_notes_on_flights_and_on_the_baseline_have_the_name_once(sweeps):
+    one, other = stuck(sweeps[0], "one"), stuck(sweeps[1], "other")
+    whose = ["one.csv", "3 of 3 baseline flights"]
+    notes = measure([one], VEHICLE, [other, other, other]).notes
+    assert [n[:n.index(":")] for n in notes if "gyro_x_radps does not change" in n] == whose
+    silent = [without(log, *GYRO) for log in (one, other, other, other)]
+    of_silent = diagnose(silent[:1], VEHICLE, silent[1:]).notes
+    assert [n[:n.index(":")] for n in of_silent if n.endswith("vbat_V")] == whose
+
+
 def test_inconsistent_baseline_is_said_and_the_measurement_goes_on(sweeps):
     """One of two nominal flights carries a bias that the other does not."""
     other = sweeps[1].with_columns({a: sweeps[1][a] + 1.5 for a in ("acc_x_mps2",)})

@@ -10,7 +10,7 @@ import short_flights
 from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
 from airtouch.gap.diagnosis import MOST_SECONDS, flights_to_judge
-from airtouch.gap.result import Diagnosis, Quantity
+from airtouch.gap.result import FITTED, HELD_OUT, Closure, Diagnosis, NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import terms
 from gap_flights import VEHICLE
 from hovers import FLOOR, hover
@@ -43,6 +43,18 @@ def test_of_flights_that_differ_in_length_no_more_than_210_s_are_judged():
     long_first = [np.zeros(6000)] * 2 + [np.zeros(1000)] * 18
     judged = flights_to_judge(long_first)
     assert 4 < len(judged) < 20 and sum(len(f) for f in judged) * 0.01 <= MOST_SECONDS
+
+
+@pytest.mark.parametrize(("effects", "judged_on"), [
+    ([("downwash", (("a.csv", 1.0, 2.0),))], FITTED), ([("downwash", ())], HELD_OUT), ([], HELD_OUT),
+    ([("downwash", (("a.csv", 1.0, 2.0),)), ("mass", ())], HELD_OUT)])
+def test_a_passing_effect_alone_is_measured_on_what_it_was_fitted_to(monkeypatch, effects, judged_on):
+    named = [NamedEffect(name, {}, seconds) for name, seconds in effects]
+    closure = Closure(3.0, 1.0, Quantity(1.0))
+    for name, value in (("verdict_of", "effect" if named else "none"), ("named_effects", named), ("ranking_of", ()),
+                        ("alike_of", ()), ("control_of", None)):
+        monkeypatch.setattr(diagnosis, name, lambda *_, value=value: value)
+    assert diagnosis._answer(None, None, SimpleNamespace(closure=closure)).judged_on == judged_on
 
 
 @pytest.mark.parametrize(("alone", "names"), [(0.5, ["downwash"]), (0.2, ["motor_lag", "downwash"])])

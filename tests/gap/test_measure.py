@@ -172,6 +172,10 @@ def test_a_measurement_in_two_sentences():
     gap = Measurement("x", GapMap((largest,), BASELINE, ()), (largest,), {"before": 2.34, "floor": 1.0}, ("a.csv",))
     assert gap.sentences == ("Most of the gap lies in hover, 0-0.5 Hz, lift: 1 m/s^2, 10 times the floor.",
                              "Overall it is 2.3 times the floor.")
+    large = replace(gap, gap={"before": 123.4, "floor": 1.0, "calibrated": 1234.0})
+    assert large.sentences[1].startswith("Overall it is 123 times the floor, 1234 times with the vehicle calibrated")
+    on_ground = replace(gap, where=(), gap={"before": float("nan"), "floor": 1.0})
+    assert on_ground.sentences[1] == "How large it is over all is not known: no cell of the map is in the air."
     calibrated = replace(gap, where=(), gap={**gap.gap, "calibrated": 1.2})
     assert calibrated.sentences == (
         "No gap stands out from the floor.",

@@ -53,9 +53,29 @@ def test_glitch_overshoot_and_invalid_readings_are_no_edges():
     assert logs.true_edges(flight(invalid)) == []
 
 
+def test_a_descent_that_nobody_measured_is_no_edge():
+    """From 0.8 m to 0.4 m in 2 s: with its readings it is none, and without them nobody knows."""
+    height = np.r_[np.full(300, 0.8), np.linspace(0.8, 0.4, 200), np.full(300, 0.4)]
+    log = flight(height).with_columns({"t_s": 0.01 * np.arange(800)}, sample_period_s=None)
+    rows = np.r_[:300, 500:800]
+    lost = FlightLog({name: values[rows] for name, values in log.columns.items()}, log.meta)
+    invalid = log.with_columns({"zrange_m": np.where((np.arange(800) >= 300) & (np.arange(800) < 500), np.nan, height)})
+    assert logs.true_edges(log) == logs.true_edges(lost) == logs.true_edges(invalid) == []
+
+
+@pytest.mark.parametrize("without", [10, 20])
+def test_an_edge_between_readings_that_are_close_is_one(without):
+    """The sensor reads every 25 to 50 ms; 0.11 s without a reading are two of them lost, 0.21 s are too many."""
+    height = np.r_[np.full(100, 0.8), np.full(without, np.nan), np.full(100, 0.05)]
+    assert len(logs.true_edges(flight(height))) == (without == 10)
+    slow = FlightLog({"t_s": 0.2 * np.arange(80), "zrange_m": np.repeat([0.8, 0.05], 40)}
+                     | {m: np.full(80, 40000.0) for m in PWM}, {})
+    assert [e.sample for e in logs.true_edges(slow)] == [40]  # at 5 Hz no reading is closer than 0.2 s
+
+
 def test_a_step_on_the_ground_is_no_edge_and_edges_need_a_range():
     height = np.r_[np.full(100, 0.8), np.full(100, 0.05)]
-    assert logs.true_edges(flight(height, pwm=10000.0)) == []
+    assert logs.true_edges(flight(height, pwm=0.0)) == []  # carried by hand
     with pytest.raises(AirTouchError, match="zrange_m"):
         logs.true_edges(FlightLog({PWM[0]: np.zeros(3)}))
 

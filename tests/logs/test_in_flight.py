@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import PWM, FlightLog
-from airtouch.logs.in_flight import airborne
+from airtouch.logs.in_flight import airborne, flies_below
 
 
 def log(**columns):
@@ -50,6 +51,28 @@ def test_without_motors_the_range_says_from_where_to_where():
 
 def test_the_down_range_comes_before_the_height():
     assert airborne(log(z_m=[1.0, 1.0], zrange_m=[0.0, 1.0])).tolist() == [False, True]
+
+
+def test_motors_that_never_reach_the_threshold_leave_the_height_to_tell():
+    """A PX4 quadrotor that hovers at 20 % throttle, 1 m up, was on the ground."""
+    motors = dict.fromkeys(PWM, [0.0, 13107.0, 13107.0, 13107.0, 13107.0, 0.0, 0.0])
+    quad = log(**motors, z_m=[0.0, 0.02, 1.0, 0.05, 1.0, 0.0, 0.4])  # at the end it is carried away
+    assert airborne(quad).tolist() == [False, False, True, True, True, False, False]
+    assert flies_below(quad) and any("never passes 15000" in w for w in logs.check(quad).warnings)
+    assert not any("never passes" in w for w in logs.check(log(**motors, z_m=[0.0] * 7)).warnings)
+
+
+def test_motors_off_or_a_low_height_are_no_flight_whatever_the_threshold():
+    for motors, height in (([0.0] * 3, [0.0, 1.0, 1.0]), ([7000.0] * 3, [0.05] * 3), ([7000.0] * 3, [np.nan] * 3)):
+        assert not airborne(log(**dict.fromkeys(PWM, motors), zrange_m=height)).any()
+    assert not airborne(log(**dict.fromkeys(PWM, [13000.0] * 3))).any()  # no height to tell
+    one_above = log(**dict.fromkeys(PWM, [13000.0, 16000.0, 13000.0]), zrange_m=[1.0] * 3)
+    assert airborne(one_above).tolist() == [False, True, False] and not flies_below(one_above)
+
+
+def test_another_threshold_of_the_vehicle_decides():
+    quad = log(**dict.fromkeys(PWM, [13000.0, 11000.0]), zrange_m=[0.0, 0.0])
+    assert airborne(quad).tolist() == [False, False] and airborne(quad, 11700.0).tolist() == [True, False]
 
 
 def test_a_log_with_neither_is_refused():

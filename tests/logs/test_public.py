@@ -100,6 +100,16 @@ def test_flights_come_over_http_and_failures_are_listed(two_flights, tmp_path, m
     assert states["new"] == ["a_+10d.csv.gz"] and states["failed"] == ["b.csv.gz"]
 
 
+def test_a_file_that_cannot_be_written_is_one_line_and_leaves_nothing_behind(two_flights, tmp_path):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    (out / "b.csv.gz").mkdir(parents=True)  # a folder of a flight's name
+    (source / "b.csv").write_bytes(two_flights["b.csv.gz"])
+    with pytest.raises(AirTouchError, match="b.csv.gz: is a folder"):
+        public.fetch(out, source=source)
+    assert [p.name for p in out.iterdir()] == ["b.csv.gz"]
+
+
 def test_a_missing_source_folder_is_refused(tmp_path):
     with pytest.raises(AirTouchError, match="no such folder"):
         public.fetch(tmp_path / "out", source=tmp_path / "missing")

@@ -91,6 +91,18 @@ def test_a_column_with_the_unit_of_another_quantity_is_not_taken(header):
     assert (trace.volts == 3.8).all() and trace.amperes == pytest.approx(0.02)
 
 
+@pytest.mark.parametrize("name", ["time", "timestamp", "t", "Time"])
+def test_a_time_without_a_unit_is_read_where_it_can_only_be_seconds(name):
+    def log(column, step):
+        return f"{column},bus_V,current_mA\n" + "".join(f"{step * k:g},3.8,20\n" for k in range(400))
+
+    assert ina219.power(ina219.parse(log(name, 0.005), "x.csv")).seconds == pytest.approx(1.995)
+    for milliseconds in (1.0, 5.0):
+        with pytest.raises(AirTouchError, match=rf"x\.csv:1: the column '{name}' names no unit.*name it time_ms"):
+            ina219.parse(log(name, milliseconds), "x.csv")
+    assert ina219.power(ina219.parse(log("time_s", 1.0), "x.csv")).seconds == pytest.approx(399.0)
+
+
 def test_a_log_of_power_alone_is_refused():
     with pytest.raises(AirTouchError, match="no column for volts"):
         ina219.parse("time_ms,bus_power_mW,current_mA\n1,2,3\n2,2,3\n", "x.csv")

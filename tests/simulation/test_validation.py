@@ -87,12 +87,12 @@ def test_thrust_and_rpm_fitted_on_one_stand_hold_on_another(flights, fit_stand, 
 
 @pytest.mark.parametrize(("fit_stand", "test_stand", "goal"), [
     ("ramp", "other", 0.04), ("steps", "other", 0.04), ("other", "ramp", 0.035), ("other", "steps", 0.055)])
-def test_thrust_between_laboratories_is_above_three_percent(flights, fit_stand, test_stand, goal):
-    """Between laboratories the goal of 3 % is missed: mostly level, as rpm holds within 2 %."""
+def test_thrust_holds_between_laboratories(flights, fit_stand, test_stand, goal):
+    """Within 3.5 to 5.5 %, where stands of one laboratory agree within 3 %: mostly level, as rpm holds within 2 %."""
     vehicle = fitted_on(fit_stand, flights)
     pwm, volts, thrust, speed = settled(test_stand, flights)
     predicted = speeds(vehicle, pwm, volts)
-    assert 0.03 < rms(vehicle.thrust_per_speed2 * predicted**2, thrust) < goal
+    assert rms(vehicle.thrust_per_speed2 * predicted**2, thrust) < goal
     assert rms(predicted, speed) < 0.02
 
 
@@ -134,11 +134,10 @@ def replayed(log, scale, bend, lag, delay):
 
 
 def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
-    """Lag, delay and curve from two flights, tested on two others.
+    """Lag, delay and curve from two flights; rotor speeds are tested on two others, acceleration on the fast one.
 
     These flights log no battery voltage (the column is stuck), so each flight's own mean
-    level is taken out: it is the battery's. The fast flights are tested; in the slow ones noise is
-    most of the signal.
+    level is taken out: it is the battery's. In the acceleration of the slow flight noise is most of the signal.
     """
     training = [in_the_air(flights, n) for n in ("jana20", "jana27")]
 
@@ -147,11 +146,9 @@ def test_replayed_commands_give_the_recorded_acceleration_and_rpm(flights):
 
     best = minimize(cost, (0.9, 0.8, 0.03, 0.015), method="Nelder-Mead", options={"maxiter": 70}).x
     assert 0.0 < best[2] < 0.12
-    for name in ("jana28",):
-        log, usable = in_the_air(flights, name)
-        force, speed = replayed(log, *best)
-        error = (log["acc_z_mps2"] - force)[usable]
-        assert 1 - np.var(error) / np.var(log["acc_z_mps2"][usable]) > 0.9
+    log, usable = in_the_air(flights, "jana28")
+    error = (log["acc_z_mps2"] - replayed(log, *best)[0])[usable]
+    assert 1 - np.var(error) / np.var(log["acc_z_mps2"][usable]) > 0.9
     per_rpm = [np.mean(replayed(log, *best)[1][usable, 1:], axis=0) / log.stack(("rpm_2", "rpm_3",
             "rpm_4"))[usable].mean(0)
                for log, usable in training]

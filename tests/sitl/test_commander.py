@@ -101,3 +101,21 @@ def test_thrust_is_locked_until_it_was_zero():
     set_point = drone.fly()
     assert (set_point[row.MODE], set_point[row.MOTORS], set_point[row.Z]) == (row.TILT_THRUST, 1.0, 40000.0)
     assert set_point[[row.VX, row.VY]] == pytest.approx([5.0, 30.0])  # degrees; the pitch is limited
+
+
+def test_manual_angles_are_flown_and_manual_rates_are_not():
+    drone = Drone()
+    drone.client.send_setpoint_manual(5.0, 0.0, 0.0, 50.0, rate=False)
+    set_point = drone.fly()
+    assert set_point[row.MODE] == row.TILT_THRUST and set_point[row.VX] == pytest.approx(5.0)
+    drone.client.send_setpoint_manual(90.0, 0.0, 0.0, 50.0, rate=True)  # 90 degrees a second, no angle
+    assert drone.fly()[row.VX] == pytest.approx(5.0)
+
+
+def test_of_a_full_state_the_position_is_flown():
+    drone = Drone()
+    drone.client.send_full_state_setpoint((0.7, -0.2, 0.9), (1.0, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, 0.0, 1.0), 0, 0, 0)
+    set_point = drone.fly()
+    assert set_point[row.MODE] == row.HOLD
+    assert set_point[[row.X, row.Y, row.Z]] == pytest.approx([0.7, -0.2, 0.9], abs=0.001)  # whole millimetres
+    assert np.degrees(set_point[row.YAW]) == pytest.approx(90.0)

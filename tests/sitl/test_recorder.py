@@ -1,11 +1,14 @@
 """The recording of a session: one log, whole or not at all."""
 
+import time
+
 import numpy as np
 import pytest
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS
+from airtouch.sitl import Server, serve
 from airtouch.sitl.recorder import Recorder
 
 
@@ -29,11 +32,31 @@ def test_a_session_without_rows_writes_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_existing_file_and_a_missing_folder_are_refused_before_the_session(tmp_path):
+def test_an_existing_file_and_a_folder_that_cannot_be_made_are_refused_before_the_session(tmp_path):
     (tmp_path / "a.csv").write_text("mine")
     with pytest.raises(AirTouchError, match="exists already; use --force"):
         Recorder(tmp_path / "a.csv", "", "", 0, 0, force=False)
-    with pytest.raises(AirTouchError, match="no such folder"):
-        Recorder(tmp_path / "none" / "a.csv", "", "", 0, 0, force=True)
+    with pytest.raises(AirTouchError, match="a.csv: cannot be made"):
+        Recorder(tmp_path / "a.csv" / "b.csv", "", "", 0, 0, force=True)
+    with pytest.raises(AirTouchError, match="is a folder"):
+        Recorder(tmp_path, "", "", 0, 0, force=True)
     Recorder(tmp_path / "a.csv", "", "", 0, 0, force=True)
     assert (tmp_path / "a.csv").read_text() == "mine"  # replaced at the end alone
+
+
+def test_a_recording_that_cannot_be_written_is_an_error_of_the_session(tmp_path):
+    folder = tmp_path / "gone"
+    folder.mkdir()
+    with pytest.raises(AirTouchError, match=r"gone/a\.csv"), serve(port=0, speed=50.0, record=folder / "a.csv") as sitl:
+        while sitl.drone.ticks < 10:
+            time.sleep(0.01)
+        folder.rmdir()
+
+
+def test_an_error_while_it_serves_ends_the_session_with_it(monkeypatch):
+    def fail(*_):
+        raise RuntimeError("a bug")
+
+    monkeypatch.setattr(Server, "step", fail)
+    with pytest.raises(RuntimeError, match="a bug"), serve(port=0):
+        time.sleep(0.1)

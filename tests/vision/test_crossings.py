@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from airtouch.detector.trace import Detection
-from airtouch.logs.edges import Edge
+from airtouch.errors import AirTouchError
+from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vision.camera import Camera
 from skips import needs
@@ -126,3 +127,13 @@ def test_a_constant_lag_is_learnt_on_the_first_films_and_taken_off_all():
     corrected = compare.without_lag(late, compare.lag([film, film], late[:2]))
     off = [[d.sample - e.sample for d, e in zip(some, film.edges, strict=True)] for some in corrected]
     assert off == [[0, 0], [0, 0], [5, 5]]
+
+
+def test_a_flight_that_crosses_no_edge_makes_no_film():
+    from airtouch.simulation import batch
+    from airtouch.vision import crossings
+
+    (log,) = batch.simulate("paper-4cm", workers=1)
+    assert len(crossings.film(log, 1).edges) == 2
+    with pytest.raises(AirTouchError, match="crosses no edge"):
+        crossings.film(log.slice(0, true_edges(log)[0].sample - 100), 1)

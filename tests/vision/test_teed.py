@@ -1,8 +1,11 @@
 """The network's sizes against TEED's publication, its NumPy against Keras."""
 
+from importlib import resources
+
 import numpy as np
 import pytest
 
+from airtouch.errors import AirTouchError
 from airtouch.vision import teed
 from airtouch.vision import weights as shipped
 from skips import needs
@@ -50,3 +53,12 @@ def test_weights_that_come_with_the_package_fit_their_network(name):
     for layer, shape in shapes.items():
         assert weights[f"{layer}.kernel"].shape == shape and weights[f"{layer}.bias"].shape == (teed.outputs(layer,
                                                                                                              shape),)
+
+
+@pytest.mark.parametrize("kept", [0, 100, 5000])
+def test_weights_cut_short_are_one_line(tmp_path, monkeypatch, kept):
+    whole = resources.files("airtouch.vision") / "eighth.npz"
+    (tmp_path / "eighth.npz").write_bytes(whole.read_bytes()[:kept])
+    monkeypatch.setattr(shipped.resources, "files", lambda _: tmp_path)
+    with pytest.raises(AirTouchError, match="eighth.npz: .*; make it with"):
+        shipped.load("eighth")

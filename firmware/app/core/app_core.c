@@ -19,6 +19,9 @@ static void runDetector(appCore_t *core, const edgeEvent_t *event) {
       if (event->ready) {
         appSendFeatures(core, event);
       }
+      if (!event->armed) {
+        core->log.over = 0;  // the decoder forgets on the ground
+      }
       if (event->edge != EDGE_NONE) {
         appReport(core, event->edge);
       }

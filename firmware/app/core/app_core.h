@@ -55,7 +55,8 @@ typedef enum {
   APP_NO_SENSOR = 512,     ///< the firmware lacks a log variable that the app needs
   APP_NO_HORIZONTAL =
       1024,  ///< horizontal acceleration stood still for a second of flight: another estimator is needed
-  APP_OTHER_VEHICLE = 2048,  ///< the wanted network was trained for another vehicle: FR-CFAR runs alone
+  APP_OTHER_VEHICLE = 2048,  ///< FR-CFAR runs alone: the networks were trained for another vehicle, or that of
+                             ///< `best` as exported has shapes or a size that the app does not take
 } appHealth_t;
 
 /** The app. It points into itself: initialise it where it stays, never copy it. */

@@ -28,6 +28,9 @@ void appTakeLogits(appCore_t *core, const float logits[EDGE_DECODER_LOGITS], boo
   memcpy(core->log.logit, logits, sizeof core->log.logit);
   core->log.probability = airborne ? appSigmoid(logits[0]) : 0.0f;
   core->log.answers++;
+  if (!airborne) {
+    core->log.over = 0;  // the decoder forgets on the ground
+  }
   const bool vouched = core->pipeline.sinceAlert < core->pipeline.config.alertHold;
   if (edge != EDGE_NONE && (vouched || !appFilters(core))) {
     appReport(core, edge);

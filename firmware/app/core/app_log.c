@@ -49,7 +49,7 @@ static uint16_t linkHealth(const appCore_t *core) {
 
 uint16_t appHealthStep(appCore_t *core) {
   static const uint16_t flags[APP_EVENTS] = {APP_NON_FINITE, APP_PARAM_CLAMPED, APP_DROPPED, APP_LATE};
-  uint16_t health = appUsesGap8(core) ? linkHealth(core) : 0;
+  uint16_t health = core->params.enable && appUsesGap8(core) ? linkHealth(core) : 0;
   for (int i = 0; i < APP_EVENTS; i++) {
     health = (uint16_t)(health | (core->since[i] < APP_RECENT_STEPS ? flags[i] : 0));
     core->since[i] = (uint16_t)(core->since[i] + (core->since[i] < UINT16_MAX ? 1 : 0));

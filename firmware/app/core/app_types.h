@@ -63,7 +63,7 @@ typedef struct {
   uint16_t lag;          ///< samples between the newest one and the last answer of the GAP8
   uint8_t edge;          ///< the last edge: 0 none yet, 1 entry, 2 exit, 3 of unknown kind
   uint8_t alert;         ///< the cell exceeds its threshold
-  uint8_t over;          ///< over a platform, as far as the last edge says
+  uint8_t over;          ///< over a platform, as far as the last edge of this flight says; 0 on the ground
   uint8_t detector;      ///< the detector in force, which is another than the wanted one without a GAP8
   uint8_t link;          ///< linkState_t
 } appLog_t;

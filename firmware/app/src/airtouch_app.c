@@ -130,7 +130,7 @@ LOG_ADD(LOG_UINT16, edges, &core.log.edges)
 LOG_ADD(LOG_UINT8, edge, &core.log.edge)
 /** @brief The step at which it was reported */
 LOG_ADD(LOG_UINT32, edgeStep, &core.log.edgeSample)
-/** @brief Over a platform, as the last edge says */
+/** @brief Over a platform, as the last edge of this flight says; 0 on the ground */
 LOG_ADD(LOG_UINT8, over, &core.log.over)
 /** @brief Steps of 10 ms so far; stands still where the app does */
 LOG_ADD(LOG_UINT32, steps, &core.log.samples)

@@ -21,19 +21,22 @@ static const char *const names[VARIABLES][2] = {{"stateEstimate", "z"},  {"state
                                                 {"stateEstimate", "qx"}, {"stateEstimate", "qy"},
                                                 {"gyro", "x"},           {"gyro", "y"}};
 static logVarId_t ids[VARIABLES];
-static enum { NOT_SOUGHT, FOUND, LACKING } variables;
+static volatile enum { NOT_SOUGHT, FOUND, LACKING } variables;  // set by either deck's task
 static uint8_t enable;
 static floorHeight_t state;
 
-/** Looks once: a search through the whole table. @return false where a variable is lacking: everything stays as it is
+/**
+ * Looks at the start alone: a search through the whole table. A deck's task that comes in meanwhile looks by itself.
+ * @return false where a variable is lacking: everything stays as it is
  */
 static bool findVariables(void) {
   if (variables == NOT_SOUGHT) {
-    variables = FOUND;
+    bool all = true;
     for (int i = 0; i < VARIABLES; i++) {
       ids[i] = logGetVarId(names[i][0], names[i][1]);
-      variables = logVarIdIsValid(ids[i]) ? variables : LACKING;
+      all = all && logVarIdIsValid(ids[i]);
     }
+    variables = all ? FOUND : LACKING;
   }
   return variables == FOUND;
 }

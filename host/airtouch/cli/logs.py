@@ -12,8 +12,9 @@ import click
 
 from airtouch import logs
 from airtouch.cli import Suggesting
+from airtouch.cli.shared.flights import flights_of_folder
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import flights_in, ignored, write
+from airtouch.logs.files import write
 from airtouch.logs.formats.rosbag import is_bag
 
 RERUN = "rrd"  #: ending of Rerun files, which are only written
@@ -163,13 +164,7 @@ def _each(inputs: tuple[list[Path], list[dict[str, str]]], act: Callable[[Path],
 
 def _expand(path: Path) -> list[Path]:
     """The flight logs that a name stands for. Says how many files of a folder are none."""
-    if not os.path.isdir(path) or is_bag(path):
-        return [path]
-    flights, others = flights_in(path), ignored(path)
-    if others:
-        click.echo(f"airtouch: {path}: {others} other {'file' if others == 1 else 'files'} in this folder, "
-                   "by name and content no flight logs", err=True)
-    return flights
+    return flights_of_folder(path) if os.path.isdir(path) and not is_bag(path) else [path]
 
 
 def _progress(paths: list[Path]) -> Iterable[Path]:

@@ -1,8 +1,8 @@
 """The commands of a mission and when to send them: a state machine without threads and without a radio.
 
 The firmware answers every command of the high-level commander; a command without an answer is sent again.
-While the link is silent the firmware finishes its leg and hovers. A stop therefore lands the drone as soon
-as a command gets through.
+While the link is silent the firmware finishes its leg and hovers. Nothing is sent to a drone that was not heard for
+SILENT_S: it may have restarted, and a landing would spin its motors. A stop lands it as soon as it is heard again.
 """
 
 import math
@@ -13,6 +13,7 @@ from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.mission import LANDING_MPS, Leg
 
 RESEND_S = 0.3  #: s without an answer, after which a command is sent again
+SILENT_S = 1.0  #: s without a packet, after which nothing is sent until one comes; chosen
 TRIES = 8  #: times that a command is sent; after that it counts as accepted if log packets still arrive
 SETTLE_S = 1.0  #: s from the end of a landing to the stop of the motors
 BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
@@ -86,12 +87,15 @@ class Autopilot:
         if not self.in_air:
             self.phase = "done"
             return
-        self.phase, self._command = "landing", None
+        self.phase, self._command, self._answered = "landing", None, False
         self._until_s = -math.inf
 
     def step(self, now_s: float, wall_s: float, silence_s: float = 0.0) -> list[Command]:
         """The commands to send now. now_s: drone's clock; wall_s: host's; silence_s: since the last packet."""
         if self.phase == "done":
+            return []
+        lands = self.phase == "landing" and self._command is not None and self._answered  # by itself, to the end
+        if silence_s > SILENT_S and not lands:
             return []
         if self._command is not None and not self._answered:
             return self._again(now_s, wall_s, silence_s)

@@ -75,14 +75,12 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
     scene = scene_of(name_or_path)
     plan = scenario.draw_flight(scene, seed, flight)
     legs = legs_of(plan.setpoints)
-    if not any(leg.kind == "take-off" for leg in legs):
-        raise AirTouchError(f"{scene.name}: this mission never takes off")
     level = [(leg.seconds, speed) for leg, speed in zip(legs, _speeds(legs), strict=True) if leg.kind == "go"]
     return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
 
 
 def scene_or_scenario(name_or_path: str | Path) -> scenario.Scenario:
-    """`scene_of`, for what need not take off: where there is none, the error is the scenarios'."""
+    """`scene_of` whose error, where there is none, is the scenarios'."""
     return scene_of(name_or_path) if str(name_or_path) in names() else scenario.load(name_or_path)
 
 

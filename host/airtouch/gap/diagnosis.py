@@ -7,7 +7,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.controls import arms_of, control_of
 from airtouch.gap.answer.named_effects import named_effects
-from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
+from airtouch.gap.answer.notes import at_end_of_range, cannot_be_replayed, mostly_random, signs_not_shown
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, closure_of, gap_of
@@ -16,7 +16,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, notes_on, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -25,7 +25,7 @@ from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences, flown_unlike, logged_unlike
 from airtouch.gap.passing import overhead
-from airtouch.gap.result import Diagnosis
+from airtouch.gap.result import FITTED, HELD_OUT, Diagnosis
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -90,7 +90,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
-        return balance_result.diagnosis(usable, nominal, vehicle, notes, without, pictures)
+        return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
+                                        pictures)
     say("calibration")
     calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
     if before is not None and before.calibrated is not None:
@@ -134,12 +135,13 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
     verdict, before = verdict_of(data, selection, gap), gap.closure.before
     is_effect = verdict == "effect"
     effects = named_effects(data, selection) if is_effect else []
+    passes_alone = len(effects) == 1 and bool(effects[0].seconds)  # it may act in one half only: none is held out
     ranking = ranking_of(data, selection, gap, verdict, effects[0].name if effects else verdict)
     return Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=() if verdict == "none" else alike_of(selection),
         where=(), gap={"before": before, "after": gap.closure.after if is_effect else before, "floor": 1.0},
-        shrink=gap.closure.shrink if is_effect else None,
+        shrink=gap.closure.shrink if is_effect else None, judged_on=FITTED if passes_alone else HELD_OUT,
         control=control_of(data, selection, gap) if is_effect else None)
 
 
@@ -157,7 +159,8 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         result, where=cells, map=whole_map, headline=headline,
         arms=arms_of(comparison.declared, judged, selection, result) if is_effect else {},
         unexplained=tuple(unexplained(study, judged, selection, cells)) if result.verdict == "unknown" else (),
-        cannot=cannot_of([f.cannot for f in usable]), flights=tuple(f.name for f in usable),
+        cannot=(*cannot_of([f.cannot for f in usable]), *cannot_be_replayed(selection)),
+        flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
@@ -174,7 +177,7 @@ def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[s
 
 def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     """What is worth a word: on the flights, on logs left out (of_logs), on the baseline, on flights not judged."""
-    notes = [note for f in comparison.usable for note in f.notes] + [*of_logs]
+    notes = [*notes_on(comparison.usable, comparison.nominal), *of_logs]
     notes += list(comparison.calibration.notes) if comparison.calibration else [NO_BASELINE]
     notes += differences(comparison.study, comparison.nominal)
     notes += flown_unlike(comparison.study, comparison.usable)

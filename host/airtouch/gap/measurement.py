@@ -10,7 +10,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
-from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import ready, ready_flights, with_gyro_if_any
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
@@ -19,7 +19,7 @@ from airtouch.gap.result import Quantity, rounded
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell, plain_cell
-from airtouch.gap.where.cell_words import in_words
+from airtouch.gap.where.cell_words import in_words, short
 from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
@@ -61,9 +61,11 @@ class Measurement:
         """Where most of the gap lies, and how large all of it is."""
         where = f"Most of the gap lies {in_words(self.headline)}." if self.headline else \
             "No gap stands out from the floor."
-        calibrated = f", {self.gap['calibrated']:.2g} times with the vehicle calibrated on the baseline flights." \
+        if not np.isfinite(self.gap["before"]):
+            return where, "How large it is over all is not known: no cell of the map is in the air."
+        calibrated = f", {short(self.gap['calibrated'])} times with the vehicle calibrated on the baseline flights." \
             if "calibrated" in self.gap else "."
-        return where, f"Overall it is {self.gap['before']:.2g} times the floor{calibrated}"
+        return where, f"Overall it is {short(self.gap['before'])} times the floor{calibrated}"
 
     def plain(self) -> dict[str, Any]:
         """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
@@ -122,7 +124,8 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [f"{m.parts[0].name}: {n}" for m in measured for n in m.notes]
+    notes += [*notes_of([(m.parts[0].name, m.notes) for m in measured]),
+              *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,

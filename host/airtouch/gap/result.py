@@ -46,9 +46,10 @@ class Closure:
 
 
 class OverallGap(TypedDict, total=False):
-    """Gap of the whole flights on held-out data: rms over the floor's, without unit; empty where it is not known.
+    """Gap of the whole flights: rms over the floor's, without unit; empty where it is not known.
 
-    Where one passing effect alone is named, the data are those that it was fitted to: it may act in one half only.
+    `Diagnosis.judged_on` says on what data. They are those that the effects were fitted to where one passing effect
+    alone is named, as it may act in one half only, and of flights without a gyro, whose one mean pattern has no halves.
 
     before, after: without the named effects in the model and with them, equal where none is named; floor: 1.
     """
@@ -120,7 +121,6 @@ class RankedCandidate:
 
 
 
-
 @dataclass(frozen=True)
 class Rejected:
     """An effect that is not named though it gains much, and why, in words."""
@@ -133,6 +133,7 @@ class Rejected:
         return {"name": self.name, "fails": self.why}
 
 
+HELD_OUT, FITTED = "held out", "fitted"  #: data that effects were not fitted to, and those that they were fitted to
 REST_OF_FLIGHT = "rest of the flight"  #: as the floor of an open cell
 
 
@@ -179,9 +180,10 @@ class Diagnosis:
     """The answer to where, which and how far.
 
     verdict: "effect", "none" or "unknown"; shrink: fraction of the gap that the named effects close, None where none is
-    named; control: how far a deliberately wrong effect closes it, None where none was wrong; arms: how far the named
-    effects do with the vehicle as declared and as calibrated (`answer.controls.arms_of`). Terminal, report
-    and JSON show this and compute nothing of their own.
+    named; judged_on: the data on which the gap with them is measured, HELD_OUT or FITTED; control: how far a
+    deliberately wrong effect closes it, None where none was wrong; arms: how far the named effects do with the vehicle
+    as declared and as calibrated (`answer.controls.arms_of`). Terminal, report and JSON show this and compute nothing
+    of their own.
     """
 
     verdict: str
@@ -201,6 +203,7 @@ class Diagnosis:
     headline: Cell | None = None  #: the cell that the answer speaks of
     next: tuple[NextStep, ...] = ()  #: what to do next
     vehicle: str = ""
+    judged_on: str = HELD_OUT
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
     #: `gap.answer.pictures.Pictures`, where they were asked for
@@ -261,7 +264,7 @@ class Diagnosis:
             "ranking": [r.plain() for r in self.ranking],
             "indistinguishable": [list(g) for g in self.indistinguishable],
             "where": [plain_cell(c) for c in self.where],
-            "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None,
+            "gap": dict(self.gap), "shrink": self.shrink.plain() if self.shrink else None, "judged_on": self.judged_on,
             "control": self.control.plain() if self.control else {}, "advice": self.advice,
             "arms": {name: arm.plain() for name, arm in self.arms.items()},
             "notes": list(self.notes), "cannot": list(self.cannot), "flights": list(self.flights),

@@ -32,8 +32,7 @@ def aligned_log(signals: Mapping[str, Signal], meta: Mapping[str, Any]) -> Fligh
     columns = {"t_s": clock - begin}
     for name, (times, values) in signals.items():
         fast = name in (*GYRO, *ACC) and np.median(np.diff(times)) < 0.75 * SAMPLE_PERIOD_S if len(times) > 1 else False
-        hold_s = HOLD_BATTERY_S if name == "vbat_V" else HOLD_S
-        columns[name] = _average(times, values, clock) if fast else _hold(times, values, clock, hold_s)
+        columns[name] = _average(times, values, clock) if fast else hold(times, values, clock, hold_of(name))
     empty = [f"{name} is empty: no value while the IMU was logged" for name, values in columns.items()
              if not np.isfinite(values).any()]
     return FlightLog(columns, {"condition": "", **meta, "warnings": [*meta.get("warnings", []), *empty]})
@@ -52,10 +51,15 @@ def _average(times: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.nda
     usable = (tick >= 0) & (tick < len(clock)) & np.isfinite(values)
     count = np.bincount(tick[usable], minlength=len(clock))
     total = np.bincount(tick[usable], values[usable], minlength=len(clock))
-    return np.where(count > 0, total / np.maximum(count, 1), _hold(times, values, clock, HOLD_S))
+    return np.where(count > 0, total / np.maximum(count, 1), hold(times, values, clock, HOLD_S))
 
 
-def _hold(times: np.ndarray, values: np.ndarray, clock: np.ndarray, longest_s: float) -> np.ndarray:
+def hold_of(name: str) -> float:
+    """Seconds for which a column's last value is repeated."""
+    return HOLD_BATTERY_S if name == "vbat_V" else HOLD_S
+
+
+def hold(times: np.ndarray, values: np.ndarray, clock: np.ndarray, longest_s: float) -> np.ndarray:
     """The last value before each tick, (m,); NaN where it is older than `longest_s` or missing."""
     last = np.searchsorted(times, clock + 1e-9, side="right") - 1
     recent = (last >= 0) & (clock - times[np.maximum(last, 0)] <= longest_s)

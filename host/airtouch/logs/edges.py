@@ -4,14 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airtouch.logs.checks.clock import sample_period
+from airtouch.logs.checks.clock import regular_time, sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
+from airtouch.parameters import DEFAULT
 
 STEP_M = 0.30  #: m, least change of the down range within two samples at an edge
 ROUNDING_M = 1e-6  #: m, added to STEP_M, so that a step of exactly 0.30 m is no edge in floating point
 SETTLING_S = 0.10  #: s; the 24 to 40 Hz sensor may need two or three readings to settle after a step
 LEVEL_S = 0.10  #: s before and after an edge over which the heights are averaged
+LONGEST_GAP_S = 0.15  #: s without a valid reading or a row, after which a step is no edge; chosen, 3 readings at 24 Hz
+LONGEST_GAP_PERIODS = 1.5  #: sample periods that are no gap: one of a slow log exceeds 0.15 s
 IN_FLIGHT_S = 0.25  #: s before and after an edge in which the drone must fly
 
 
@@ -25,17 +28,20 @@ class Edge:
     height_after_m: float
 
 
-def true_edges(log: FlightLog, step_m: float = STEP_M) -> list[Edge]:
+def true_edges(log: FlightLog, step_m: float = STEP_M, arm_pwm: float = DEFAULT.arm_pwm) -> list[Edge]:
     """True edges of a flight in order of time.
 
     An edge is the first sample at which the down range falls (entry) or rises (exit) by more
     than `step_m` within two samples, in flight. Steps within 0.1 s of it are the sensor settling
-    and belong to it. A step that is undone within 0.1 s is a glitch and no edge. Low platforms
-    need a `step_m` below 0.30. Raises AirTouchError for a log without `zrange_m`.
+    and belong to it. A step that is undone within 0.1 s is a glitch and no edge. A step over more
+    than 0.15 s (and 1.5 sample periods) without a valid reading or a row is none either. Low
+    platforms need a `step_m` below 0.30. arm_pwm: as of `airborne`. Raises AirTouchError for a
+    log without `zrange_m`.
     """
     height = _filled_forward(log["zrange_m"])
-    steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log))
     period = sample_period(log)
+    steps = np.flatnonzero(_steps(height, step_m) & _in_flight(log, arm_pwm))
+    steps = steps[~_after_gap(log, period)[steps]] if len(steps) else steps
     settling = max(int(round(SETTLING_S / period)), 2)
     level = max(int(round(LEVEL_S / period)), 1)
     edges: list[Edge] = []
@@ -60,13 +66,23 @@ def _steps(height: np.ndarray, step_m: float) -> np.ndarray:
     return moved
 
 
-def _in_flight(log: FlightLog) -> np.ndarray:
+def _after_gap(log: FlightLog, period: float) -> np.ndarray:
+    """True for the first two samples after a gap in the down range, by invalid readings or lost rows, (n,) bool."""
+    time_s, _ = regular_time(log)
+    valid = np.flatnonzero(np.isfinite(log["zrange_m"]) & np.isfinite(time_s))
+    gap = np.diff(time_s[valid]) > max(LONGEST_GAP_S, LONGEST_GAP_PERIODS * period)
+    after = np.zeros(len(log) + 1, dtype=bool)
+    after[valid[1:][gap]] = after[valid[1:][gap] + 1] = True
+    return after[:-1]
+
+
+def _in_flight(log: FlightLog, arm_pwm: float) -> np.ndarray:
     """True where the drone is airborne now and for IN_FLIGHT_S before and after, (n,) bool."""
     margin = max(int(round(IN_FLIGHT_S / sample_period(log))), 1)
     n = len(log)
     if n <= 2 * margin:
         return np.zeros(n, dtype=bool)
-    grounded = np.r_[0, np.cumsum(~airborne(log))]
+    grounded = np.r_[0, np.cumsum(~airborne(log, arm_pwm))]
     place = np.arange(n)
     return grounded[np.minimum(place + margin + 1, n)] == grounded[np.maximum(place - margin, 0)]
 

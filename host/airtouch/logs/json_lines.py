@@ -11,15 +11,16 @@ from airtouch.logs.files import read_text
 
 
 def read(path: Path | None) -> list[dict[str, Any]]:
-    """The objects of a file; none without a file. Raises AirTouchError, with the line, for anything else in it."""
+    """The objects of a file; none without a file. A last line that a kill cut short is left out.
+
+    Raises AirTouchError, with the line, for anything else in it.
+    """
     if path is None or not path.exists():
         return []
+    text = read_text(path)
     objects = []
-    for number, line in enumerate(read_text(path).splitlines(), 1):
-        try:
-            one = json.loads(line)
-        except ValueError:
-            one = None
+    for number, line in enumerate(text[:_whole(text)].splitlines(), 1):
+        one = _value(line)
         if not isinstance(one, dict):
             raise AirTouchError(f"{path}: line {number} is no JSON object; remove that line")
         objects.append(one)
@@ -29,12 +30,31 @@ def read(path: Path | None) -> list[dict[str, Any]]:
 def append(path: Path | None, objects: Iterable[dict[str, Any]]) -> None:
     """Append objects to a file, which is made if it is not there; nothing without a path.
 
-    A last line that a kill cut short stays a line of its own.
+    A last line that a kill cut short is removed; another one without an end gets one.
     """
     if path is not None:
         with path.open("ab+") as file:
             end = file.seek(0, os.SEEK_END)
             file.seek(max(end - 1, 0))
             if file.read(1) not in (b"", b"\n"):
-                file.write(b"\n")
+                file.seek(0)
+                text = file.read().decode("latin-1")  # a character for each byte
+                file.truncate(_whole(text))
+                if _whole(text) == len(text):
+                    file.write(b"\n")
             file.writelines(json.dumps(one).encode() + b"\n" for one in objects)
+
+
+def _whole(text: str) -> int:
+    """Characters of a text before its last line if that is the beginning of an object and has no end; else all."""
+    begin = text.rfind("\n") + 1
+    last = text[begin:]
+    return begin if last.startswith("{") and _value(last) is None else len(text)
+
+
+def _value(line: str) -> Any:
+    """The value of a line of JSON; None for anything else."""
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import MANIFEST, load_bytes, make_folder
+from airtouch.logs.files import MANIFEST, load_bytes, make_folder, write_bytes
 
 REPOSITORY = "ChenyuZhaoTHU/crazyflie_filter_constant"
 COMMIT = "b4c403e620fbce96d1539665b2fb342955ccf9ee"
@@ -44,12 +44,11 @@ def fetch(
     read = from_folder(source) if source is not None else _from_network(base_url)
     make_folder(out)
     _check_manifest(out / MANIFEST)
-    if not force:
-        _check_others(out)
+    present = _present(out, force)
     states: dict[str, list[str]] = {"present": [], "new": [], "failed": []}
     for row in registry():
         target = out / row["file"]
-        state = "present" if has_file(target, row["sha256"]) else _place(read, row, target)
+        state = "present" if row["file"] in present else _place(read, row, target)
         states[state].append(row["file"])
         if progress:
             progress(row["file"], state)
@@ -58,20 +57,12 @@ def fetch(
     return states
 
 
-def has_file(path: Path, sha256: str) -> bool:
-    """True if the file is there and its unpacked content has this hash."""
-    try:
-        return hashlib.sha256(load_bytes(path)).hexdigest() == sha256
-    except AirTouchError:
-        return False
-
-
 def _place(read: Callable[[str, str], bytes | None], row: dict[str, str], target: Path) -> str:
     """Write a flight of the registry to `target`, gzipped: "new", or "failed" where its SHA-256 is another."""
     content = read(row["file"], row["sha256"])
     if content is None or hashlib.sha256(content).hexdigest() != row["sha256"]:
         return "failed"
-    _replace(target, gzip.compress(content, 6, mtime=0))
+    write_bytes(gzip.compress(content, 6, mtime=0), target, force=True)
     return "new"
 
 
@@ -127,31 +118,31 @@ def _check_manifest(path: Path) -> None:
         raise AirTouchError(f"{path}: not the manifest of these flights; choose another --out, or move it away")
 
 
-def _check_others(out: Path) -> None:
-    """Raise AirTouchError for a file that has a flight's name, can be read, and is not that flight."""
+def _present(out: Path, force: bool) -> set[str]:
+    """The flights that are there already, by name.
+
+    Raises AirTouchError, without `force`, for a file that has a flight's name, can be read, and is not that flight.
+    """
+    present = set()
     for row in registry():
         target = out / row["file"]
         try:
             content = load_bytes(target)
         except AirTouchError:
             continue
-        if hashlib.sha256(content).hexdigest() != row["sha256"]:
+        if hashlib.sha256(content).hexdigest() == row["sha256"]:
+            present.add(row["file"])
+        elif not force:
             raise AirTouchError(f"{target}: another content than the published flight; use --force to replace it, or "
                                 "choose another --out")
+    return present
 
 
 def _write_manifest(path: Path, present: set[str]) -> None:
     """Write the manifest.csv of the flights that are present."""
     lines = [line for file, line in _manifest_lines().items() if file in present | {"file"}]
-    _replace(path, ("\n".join(lines) + "\n").encode())
+    write_bytes(("\n".join(lines) + "\n").encode(), path, force=True)
 
 
 def _quote(cell: str) -> str:
     return f'"{cell}"' if "," in cell else cell
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write to a temporary file beside `path`, then rename it."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_bytes(content)
-    temporary.replace(path)

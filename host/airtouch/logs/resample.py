@@ -3,10 +3,11 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
+from airtouch.logs.alignment import hold, hold_of
 from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
-LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN, unless they are within LONGEST_BRIDGE_PERIODS
+LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN, unless they are within LONGEST_BRIDGE_PERIODS; not of HELD
 LONGEST_BRIDGE_PERIODS = 1.5  #: sample periods that are always bridged: one of a slow log exceeds 0.1 s
 CUTOFF = 0.4  #: corner of the anti-aliasing low-pass as a fraction of the new rate
 HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels, resampled by holding the last value, unfiltered
@@ -19,8 +20,9 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
     """The flight resampled to exactly `rate_hz`, with `t_s` from 0.
 
     To a lower rate a zero-phase Butterworth low-pass (8th order, forward and backward, corner at
-    0.4 of the new rate) prevents aliasing. Values are interpolated linearly; ranges and battery
-    hold their last value. Gaps longer than both 0.1 s and 1.5 sample periods become NaN.
+    0.4 of the new rate) prevents aliasing. Values are interpolated linearly. Gaps longer than
+    both 0.1 s and 1.5 sample periods become NaN. Ranges hold their last value for 0.25 s and the
+    battery for 5 s (`alignment.hold_of`), or 1.5 sample periods where those are longer.
     meta["resampled"] describes this.
     Samples without a time, or out of order, are left out; a warning counts them.
     Raises AirTouchError for a rate outside 0.2 to 10000 Hz, a clock that stands still, and a
@@ -70,16 +72,21 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
              low_pass_for: float | None) -> dict[str, np.ndarray]:
     """The channels at the new times. Channels that are valid at the same samples are filtered together."""
     low_pass = _low_pass(period, low_pass_for) if low_pass_for else None
-    alike: dict[tuple[bool, bytes], list[str]] = {}
-    for name, values in columns.items():
-        alike.setdefault((name in HELD, np.isfinite(values).tobytes()), []).append(name)
+    alike: dict[bytes, list[str]] = {}
     new: dict[str, np.ndarray] = {}
-    for (hold, mask), names in alike.items():
+    for name, values in columns.items():
+        valid = np.isfinite(values)
+        if name in HELD and valid.any():
+            longest_s = max(hold_of(name), LONGEST_BRIDGE_PERIODS * period)
+            new[name] = hold(time_s[valid], values[valid], new_time, longest_s)
+        else:
+            alike.setdefault(valid.tobytes(), []).append(name)
+    for mask, names in alike.items():
         valid = np.frombuffer(mask, dtype=bool)
         values = np.array([columns[name][valid] for name in names])
         for name in set(names) & set(ANGLES):
             values[names.index(name)] = np.unwrap(values[names.index(name)])
-        values = _at(values, time_s[valid], new_time, period, hold, low_pass)
+        values = _at(values, time_s[valid], new_time, period, low_pass)
         new |= dict(zip(names, values, strict=True))
     for name in set(new) & set(ANGLES):
         new[name] = np.angle(np.exp(1j * new[name]))
@@ -88,7 +95,7 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
     return {name: new[name] for name in columns}
 
 
-def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float, hold: bool,
+def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: float,
         low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
     """Channels (k, n) at the new times, (k, m); NaN in gaps longer than both limits of a bridge."""
     new = np.full((len(values), len(new_time)), np.nan)
@@ -100,12 +107,9 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
         t, v = time_s[start:stop], values[:, start:stop]
         first, last = np.searchsorted(new_time, (t[0] - 1e-9, t[-1] + 1e-9))
         at = new_time[first:last]
-        if hold:
-            new[:, first:last] = v[:, np.maximum(np.searchsorted(t, at + 1e-9, side="right") - 1, 0)]
-        else:
-            t, v = _smooth(t, v, period, *low_pass) if low_pass else (t, v)
-            for row, one in zip(new, v, strict=True):
-                row[first:last] = np.interp(at, t, one)
+        t, v = _smooth(t, v, period, *low_pass) if low_pass else (t, v)
+        for row, one in zip(new, v, strict=True):
+            row[first:last] = np.interp(at, t, one)
     return new
 
 

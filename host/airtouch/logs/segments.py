@@ -8,7 +8,8 @@ import numpy as np
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import VELOCITY, FlightLog
-from airtouch.logs.in_flight import airborne
+from airtouch.logs.in_flight import airborne, height_column
+from airtouch.parameters import DEFAULT
 
 CRUISE_MPS = 0.1  #: m/s, horizontal speed above which level flight is cruise
 LEAST_HEIGHT_M = 0.05  #: m; a drone that stays below it with its motors on has not taken off
@@ -26,20 +27,20 @@ class Segment:
     stop: int
 
 
-def segments(log: FlightLog) -> list[Segment]:
+def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
     """The phases of a flight in order; every sample is in one of them.
 
-    Ground: motors below the airborne level, or never higher than 5 cm. Take-off: until
+    Ground: motors below the airborne level, or never higher than 5 cm where a height was measured. Take-off: until
     85 % of the median height in the air; landing: from the last time at that height.
     Over platform: between an entry and an exit by the down range. The rest is cruise
     where the speed is above 0.1 m/s, else hover; without velocity it is all cruise if
-    the flight crosses an edge, else all hover. Raises AirTouchError for a log with
-    neither PWM nor height.
+    the flight crosses an edge, else all hover. arm_pwm: the airborne level, of a vehicle's
+    file. Raises AirTouchError for a log with neither PWM nor height.
     """
     period = sample_period(log)
-    flying = _without_short_runs(airborne(log), int(0.5 / period))
+    flying = _without_short_runs(airborne(log, arm_pwm), int(0.5 / period))
     kinds = np.zeros(len(log), dtype=np.int8)
-    edges = true_edges(log, PLATFORM_STEP_M) if log.has("zrange_m") else []
+    edges = true_edges(log, PLATFORM_STEP_M, arm_pwm) if log.has("zrange_m") else []
     edges = [e for e in edges if flying[e.sample]]
     ground_height = _height(log, edges)
     at = [e.sample for e in edges]
@@ -51,9 +52,10 @@ def segments(log: FlightLog) -> list[Segment]:
             speed = np.hypot(log[VELOCITY[0]][here], log[VELOCITY[1]][here])
             moving = _without_short_runs(_smooth(speed, int(0.5 / period)) > CRUISE_MPS, int(0.3 / period))
             kinds[here][moving] = KINDS.index("cruise")
-        if ground_height is not None and not np.any(ground_height[here] > LEAST_HEIGHT_M):
+        measured = np.isfinite(ground_height[here]).any()
+        if measured and not np.any(ground_height[here] > LEAST_HEIGHT_M):
             kinds[here] = KINDS.index("ground")
-        elif ground_height is not None:
+        elif measured:
             _ends(kinds[here], ground_height[here])
         for edge, end in zip(crossing, [*(e.sample for e in crossing[1:]), stop], strict=False):
             if edge.kind == "entry":
@@ -61,16 +63,18 @@ def segments(log: FlightLog) -> list[Segment]:
     return [Segment(KINDS[kinds[start]], start, stop) for start, stop in _constant_runs(kinds)]
 
 
-def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray | None:
-    """Height above the ground, (n,) m; over a platform the down range plus the platform's height."""
-    if log.has("zrange_m"):
+def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray:
+    """Height above the ground, (n,) m, NaN if unknown; over a platform the down range plus the platform's height."""
+    column = height_column(log)
+    height = log[column] if log.has(column) else np.full(len(log), np.nan)
+    if column == "zrange_m":
         steps, total = np.zeros(len(log) + 1), 0.0
         for edge in edges:
             step = edge.height_before_m - edge.height_after_m if edge.kind == "entry" else -total
             steps[edge.sample] += step
             total += step
-        return log["zrange_m"] + np.cumsum(steps[:-1])
-    return log["z_m"] if log.has("z_m") else None
+        return height + np.cumsum(steps[:-1])
+    return height
 
 
 def _ends(kinds: np.ndarray, height: np.ndarray) -> None:

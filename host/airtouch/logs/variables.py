@@ -25,6 +25,8 @@ from airtouch.logs.flight_log import (
 from airtouch.logs.quaternion import decompress, euler, rotation, to_body
 from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
 
+#: metadata on the vehicle of a log that does not say which flew: `assumed_vehicle` makes `vehicle.of_log` warn
+ASSUMED = {"vehicle": "crazyflie-2.1", "assumed_vehicle": "crazyflie-2.1"}
 _DEGREE = np.pi / 180.0
 _MOTORS = (1, 2, 3, 4)
 

@@ -28,6 +28,7 @@ WITHOUT_HEADER = {"time": (0, 1e-3), "volts": (1, 1.0), "amperes": (2, 1e-3), "s
 MOST_BAD = 0.05
 MOST_V, MOST_A = 26.0, 3.2  #: V and A, the INA219's range
 GAP = 20.0  #: sample periods; no energy is counted over a longer gap; no source: round number
+LONGEST_PERIOD_S = 0.5  #: s between lines, to which a time without a unit counts as seconds; no source: round number
 BLOCK_S = 1.0  #: s, block length of the interval; no source: chosen to be longer than the noise is correlated
 
 
@@ -89,6 +90,8 @@ def parse(text: str, source: str) -> Trace:
         raise AirTouchError(f"{source}: {len(rows)} usable lines; log for some seconds")
     notes = [f"{source}: {len(bad)} damaged lines passed over, the first is {bad[0]}"] if bad else []
     table = np.array(rows)
+    if header:
+        _check_seconds(table[:, 0], header[columns["time"][0]], f"{source}:{lines[0][0]}")
     return Trace(table[:, 0], table[:, 1], table[:, 2], tuple(stages), tuple(notes))
 
 
@@ -108,12 +111,34 @@ def _possible(row: list[float], columns: dict[str, tuple[int, float]]) -> bool:
     return 0.0 <= row[1] * columns["volts"][1] <= MOST_V and abs(row[2] * columns["amperes"][1]) <= MOST_A
 
 
+def _words(name: str) -> list[str]:
+    return [w for w in re.split(r"[^a-z]+", name.lower()) if w]
+
+
+def _unit(words: list[str]) -> str | None:
+    return next((w for w in words[1:][::-1] if w in UNITS), None)
+
+
+def _period(time_s: np.ndarray) -> float:
+    """Median of the steps forward, s; 0 without one."""
+    steps = np.diff(time_s)
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+
+
+def _check_seconds(time_s: np.ndarray, name: str, where: str) -> None:
+    """Raise AirTouchError if a time column without a unit in its name is unlikely to be in seconds."""
+    words, period = _words(name), _period(time_s)
+    if _unit(words) is None and FACTORS[words[0]] == 1.0 and period > LONGEST_PERIOD_S:
+        raise AirTouchError(f"{where}: the column {name!r} names no unit, and in seconds its lines are {period:g} s "
+                            "apart; name it time_ms, time_us or time_s")
+
+
 def _columns(header: list[str], source: str, line: int) -> dict[str, tuple[int, float]]:
     """Quantity -> (column, factor to SI) from names like time_ms, "Bus Voltage (V)", current_mA."""
     columns: dict[str, tuple[int, float]] = {}
     for at, name in enumerate(header):
-        words = [w for w in re.split(r"[^a-z]+", name.lower()) if w]
-        unit = next((w for w in words[1:][::-1] if w in UNITS), None)
+        words = _words(name)
+        unit = _unit(words)
         for quantity, known in QUANTITIES.items():
             if quantity not in columns and words and words[0] in known and not _other_unit(quantity, words[1:]):
                 columns[quantity] = (at, UNITS[unit] if unit else FACTORS.get(words[0], 1.0))
@@ -139,9 +164,7 @@ def power(trace: Trace, where: np.ndarray | None = None) -> Power:
     """
     watts = trace.volts * trace.amperes
     steps = np.diff(trace.time_s)
-    rising = steps[steps > 0]
-    period = float(np.median(rising)) if len(rising) else 0.0
-    joined = (steps > 0) & (steps <= max(GAP * period, 1e-9))
+    joined = (steps > 0) & (steps <= max(GAP * _period(trace.time_s), 1e-9))
     if where is not None:
         joined &= where[1:] & where[:-1]
     seconds = float(steps[joined].sum())

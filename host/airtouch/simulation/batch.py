@@ -6,9 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation import effects as registry
 from airtouch.simulation import scenario as scenarios
 from airtouch.simulation.flight import Chosen, Diverged, fly
 from airtouch.simulation.scenario import Scenario
@@ -27,19 +30,30 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     scenario, vehicle: objects, built-in names or .toml paths. count: how many flights, or
     their numbers. A flight depends on (scenario, vehicle, effects, without, seed, its
     number) only. workers: threads (the loop runs outside Python's lock); default one a core.
-    Raises AirTouchError for bad input before the first flight.
+    Raises AirTouchError for bad input at the call, before the first flight.
     """
     scene = scenario if isinstance(scenario, Scenario) else scenarios.load(scenario)
     craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
-    numbers = range(count) if isinstance(count, int) else count
-    workers = workers or available_cores()
-    if workers < 1:
-        raise AirTouchError("workers must be 1 or more")
+    if isinstance(count, (int, np.integer)):
+        count = range(_whole(count, "the number of flights"))
+    numbers = (_whole(number, "a flight's number") for number in count)
+    seed = _whole(seed, "seed")
+    workers = available_cores() if workers is None else _whole(workers, "workers", 1)
+    effects = registry.activate(effects)
+    for name in without:
+        registry.get(name)
 
     def one(number: int) -> FlightLog | Diverged:
         return fly(scene, craft, seed, number, effects=effects, without=without)
 
-    return _in_order(one, iter(numbers), workers)
+    return _in_order(one, numbers, workers)
+
+
+def _whole(value: int, name: str, least: int = 0) -> int:
+    """The value as an int. Raises AirTouchError for one that is no whole number or is less than `least`."""
+    if not isinstance(value, (int, np.integer)) or value < least:
+        raise AirTouchError(f"{name} must be a whole number, {least} or more, not {value!r}")
+    return int(value)
 
 
 def _in_order(one, numbers: Iterator[int], workers: int) -> Iterator[FlightLog | Diverged]:
@@ -54,9 +68,10 @@ def simulate(scenario: Scenario | str | Path, vehicle: Vehicle | str | Path | No
              effects: Chosen = (),
              seeds: int | Iterable[int] = 1, *, without: Sequence[str] = (), seed: int = 0,
              workers: int | None = None) -> list[FlightLog]:
-    """Fly `seeds` flights (how many, or their numbers) and return their logs.
+    """Fly `seeds` flights of a batch (how many, or their numbers; not seeds) and return their logs.
 
-    Raises AirTouchError that names the first flight that does not end well.
+    seed: of the whole batch; the others as of `flights`. Raises AirTouchError that names the first flight that does
+    not end well.
     """
     logs = []
     for result in flights(scenario, seeds, vehicle=vehicle, effects=effects, without=without, seed=seed,

@@ -1,9 +1,11 @@
 """Random numbers of one flight: counter-based generators that depend on nothing but their key.
 
-Each consumer (a sensor, an effect) owns a generator, so that switching one effect on or
-off does not change what any other draws. Source: Steele, Lea, Flood, Fast Splittable
-Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64); Marsaglia, Tsang, The Ziggurat Method
-for Generating Random Variables, 2000.
+The motors, the IMU, the other sensors, the start and each effect own a generator each, so that switching an effect
+that adds a force on or off changes nothing that others draw. Down range and optical flow share one, and so do slow and
+fast motor noise: another period of the one, or the fast noise switched on, shifts what the other draws.
+
+Source: Steele, Lea, Flood, Fast Splittable Pseudorandom Number Generators, OOPSLA 2014 (SplitMix64); Marsaglia, Tsang,
+The Ziggurat Method for Generating Random Variables, 2000.
 """
 
 import functools

@@ -168,10 +168,10 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
         signals: np.ndarray | None = None, pwm: np.ndarray | None = None, seed: int = 0) -> Replay:
     """Replay a log's motor commands through a vehicle with effects switched on.
 
-    signals: (n, COUNT) where more is known than `signals_of` finds in the log; pwm: (n, 4)
-    where the log's own has holes. A logged
-    battery voltage is used where the vehicle declares the voltage of its thrust curve.
-    Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands.
+    signals: (n, COUNT) where more is known than `signals_of` finds in the log; its rotor speeds and thrusts are
+    overwritten, so hand in a copy. pwm: (n, 4) instead of the log's own. A command that is not finite holds the one
+    before, at the start the first that is. A logged battery voltage is used where the vehicle declares the voltage of
+    its thrust curve. Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands.
     """
     log.require(*PWM)
     plant, acting = prepare(vehicle, active)
@@ -184,13 +184,21 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
     commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
     if not np.isfinite(commands).all():
-        commands = np.nan_to_num(commands)
+        commands = _held(commands)
     _run(plant, _Log(s, commands, volts), effects, model)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
     force, torque = model.motion[:, :3] + row["acc_bias"], model.motion[:, 3:]
     turning = (torque - _cross(rates, inertia * rates)) / inertia
     return Replay(force, torque, turning, model.speeds, model.volts)
+
+
+def _held(commands: np.ndarray) -> np.ndarray:
+    """Commands (n, 4) whose values that are not finite are the last one before, or the first; 0 where none is."""
+    finite = np.isfinite(commands)
+    last = np.maximum.accumulate(np.where(finite, np.arange(len(commands))[:, None], -1), axis=0)
+    place = np.where(last < 0, finite.argmax(axis=0), last)
+    return np.nan_to_num(np.take_along_axis(commands, place, axis=0), posinf=0.0, neginf=0.0)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

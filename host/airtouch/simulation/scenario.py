@@ -85,7 +85,10 @@ def parse(text: str, source: str) -> Scenario:
             raise AirTouchError(f"{source}: {key} must be a text in quotes")
     if "mission" not in table:
         raise AirTouchError(f"{source}: no [mission]")
-    scenario = Scenario(str(table.get("name", Path(source).stem)), str(table.get("summary", "")), table)
+    name = str(table.get("name", Path(source).stem))
+    if not (Path(name).name and name.isprintable()):
+        raise AirTouchError(f"{source}: name = {name!r} must be printable text that files can be named by")
+    scenario = Scenario(name, str(table.get("summary", "")), table)
     try:
         changes = draw_flight(scenario, 0, 0).changes
     except RecursionError:

@@ -28,6 +28,6 @@ UPPER_FACTOR = 54  #: 4, the same of the higher surface
 LOWER_ROUGHNESS = 58  #: 4, unsteadiness of the air over the surface
 UPPER_ROUGHNESS = 62  #: 4, the same of the higher surface
 ACCELERATION = 66  #: 3, m/s^2, of the centre of mass in world axes: dv/dt
-HEIGHT = 69  #: m, centre of mass over what is below it
+HEIGHT = 69  #: m, over what is below: in flight of the lowest rotor, in a replay of the rotors by the down range
 POSITION = 70  #: 3, m, of the centre of mass in the world; 0 where a log holds none
 COUNT = 73  #: length of the vector

@@ -20,6 +20,8 @@ from airtouch.simulation.random_generator import GENERATOR, normal
 from airtouch.simulation.sensors import imu, ranging
 
 _F = np.float64
+PHASE_TURNS = 0.381966  #: turns between the first phases of two rotors, plus 1 rad of noise; chosen: no two alike
+START_TILT_RAD = 0.005  #: rad, rms error of roll and pitch in the first estimate; chosen, half of std_attitude_rad
 DTYPE = np.dtype([
     ("step", np.int64),  # physics steps flown
     ("time_s", _F),  # of this step
@@ -52,12 +54,12 @@ def begin(plants, ground, row, generator, states):
     yaw = row[setpoint.YAW]
     pose[6], pose[9] = math.cos(yaw / 2), math.sin(yaw / 2)
     for i in range(4):
-        state.motors.phase[i] = 6.283185307179586 * i * 0.381966 + normal(generator)
+        state.motors.phase[i] = 6.283185307179586 * i * PHASE_TURNS + normal(generator)
         body.gain[i] = plant.gain[i]
         state.walls[i] = np.nan
     body.wrench[2] = plant.mass * plant.gravity
     state.battery.charge, state.battery.volts = plant.battery_charge, plant.nominal_voltage
-    roll, pitch = 0.005 * normal(generator), 0.005 * normal(generator)
+    roll, pitch = START_TILT_RAD * normal(generator), START_TILT_RAD * normal(generator)
     imu.begin(plant, state)
     autopilot.begin(plant, state, roll, pitch, yaw)
     rigid_body.derivative(plant, body)

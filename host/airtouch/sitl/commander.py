@@ -21,6 +21,7 @@ LEAST_THRUST, MOST_THRUST = 1000, 60000  #: PWM, limits of a packet (crtp_comman
 (STOP, OLD_VELOCITY, OLD_Z_DISTANCE, CPPM, ALT_HOLD, OLD_HOVER, FULL_STATE, POSITION, VELOCITY, Z_DISTANCE,
  HOVER, MANUAL) = range(12)
 FOUR = struct.Struct("<ffff")
+FULL_STATE_BYTES = 29  #: of a packet: kind, position, velocity, acceleration, attitude and rates; the position is used
 
 
 class Commander:
@@ -69,10 +70,11 @@ class Commander:
         if kind == STOP:
             self._low_level(STOP, (0.0,) * 4, t, estimate)
         elif kind == MANUAL and len(data) >= 16:
-            roll, pitch, yaw_rate, thrust = struct.unpack_from("<fffH", data, 1)
-            self._low_level(MANUAL, (roll, pitch, yaw_rate, float(thrust)), t, estimate)
-        elif kind == FULL_STATE and len(data) >= 13:
-            x, y, z, vx, vy, vz = (v / 1000.0 for v in struct.unpack_from("<hhhhhh", data, 1))
+            roll, pitch, yaw_rate, thrust, rate = struct.unpack_from("<fffHB", data, 1)
+            if not rate:  # 1: roll and pitch are angular rates, which the simulator cannot fly
+                self._low_level(MANUAL, (roll, pitch, yaw_rate, float(thrust)), t, estimate)
+        elif kind == FULL_STATE and len(data) >= FULL_STATE_BYTES:
+            x, y, z = (v / 1000.0 for v in struct.unpack_from("<hhh", data, 1))
             self._low_level(POSITION, (x, y, z, math.degrees(estimate[2])), t, estimate)
         elif kind in (OLD_VELOCITY, OLD_Z_DISTANCE, OLD_HOVER, ALT_HOLD, POSITION, VELOCITY, Z_DISTANCE,
                       HOVER) and len(data) >= 17:

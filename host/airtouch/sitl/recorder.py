@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from airtouch.errors import AirTouchError
 from airtouch.logs import files
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
@@ -12,13 +11,10 @@ DECIMALS = 6
 
 
 class Recorder:
-    """The recording: `add` each row (33,), `write` at the end. Raises AirTouchError for a file that exists."""
+    """The recording: `add` each row (33,), `write` at the end. Raises AirTouchError if it cannot be written."""
 
     def __init__(self, path: Path, scenario: str, vehicle: str, seed: int, flight: int, force: bool) -> None:
-        if path.exists() and not force:
-            raise AirTouchError(f"{path}: exists already; use --force to replace it")
-        if not path.parent.is_dir():
-            raise AirTouchError(f"{path}: no such folder")
+        files.check_free(path, force)
         self._path, self._force = path, force
         self._rows: list[np.ndarray] = []
         self._meta = {"format": "simulated", "sample_period_s": 0.01, "acc_frame": "body", "vehicle": vehicle,

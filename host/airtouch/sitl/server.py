@@ -209,13 +209,24 @@ def _bind(host: str, port: int) -> socket.socket:
 def serve(scenario: scenarios.Scenario | str | Path = "paper-9cm", **settings) -> Iterator[Server]:
     """Run a virtual Crazyflie in a thread: `with serve(port=0) as virtual: connect(virtual.uri)`.
 
-    Takes the arguments of `Server` and raises its errors.
+    Takes the arguments of `Server` and raises its errors. An error of the thread, as of a recording that cannot be
+    written, is raised at the end.
     """
     server = Server(scenario, **settings)
-    thread = threading.Thread(target=server.run, name="virtual-crazyflie", daemon=True)
+    errors: list[Exception] = []
+
+    def run() -> None:
+        try:
+            server.run()
+        except Exception as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=run, name="virtual-crazyflie", daemon=True)
     thread.start()
     try:
         yield server
     finally:
         server.stop()
         thread.join()
+        if errors:
+            raise errors[0]

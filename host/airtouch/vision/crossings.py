@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from airtouch.detector.trace import Detection
+from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.quaternion import rotation
@@ -42,11 +43,16 @@ class Film:
 
 
 def film(log: FlightLog, seed: int) -> Film:
-    """A simulated flight over one platform, with textures drawn by seed: mean albedos 0.15 to 0.85, any contrast."""
+    """A simulated flight over one platform, with textures drawn by seed: mean albedos 0.15 to 0.85, any contrast.
+
+    Raises AirTouchError for a flight that crosses no edge.
+    """
     rng = np.random.default_rng([seed, log.meta["flight"], 17])
     plan = scenario.draw_flight(scenario.load(log.meta["scenario"]), log.meta["seed"], log.meta["flight"])
     corners = plan.world.corners[plan.world.first[0]:plan.world.first[1]]
     edges = tuple(true_edges(log))
+    if not edges:
+        raise AirTouchError(f"{log.source}: crosses no edge, and a film begins and ends at one")
     floor, top = (draw_texture(rng) for _ in range(2))
     drawn = scenes.Scene(floor, top, corners, float(plan.world.surface[0, 0]))
     return Film(log, edges, drawn, plan.values["clearance"], plan.values["speed"],

@@ -1,6 +1,8 @@
 """The sizes of the network, and its weights, which `python -m airtouch.vision.training` made."""
 
 import hashlib
+import zipfile
+import zlib
 from importlib import resources
 
 import numpy as np
@@ -20,7 +22,7 @@ def load(name: str) -> tuple[teed.Weights, float]:
     try:
         with np.load(path) as file:
             return {key: file[key].astype(np.float32) for key in file.files if key != "seconds"}, float(file["seconds"])
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise AirTouchError(f"{path}: {error}; make it with python -m airtouch.vision.training") from None
 
 

@@ -42,11 +42,12 @@ def changed(monkeypatch):
 def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path):
     log = made_flight(2)
     trained = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=replace(SMALL, steps=3))
-    assert trained.int8.layers[-1].weights.shape[0] == 4
+    assert trained.int8.layers[-1].weights.shape[0] == len(outputs.OUTPUTS)
     assert trained.int8.layers[2].weights.shape == (SMALL.width, SMALL.width)
     trained.save(tmp_path / "mine.npz")
     again = best.load(tmp_path / "mine.npz")
-    assert best.run_float(log, again).signals["logits"].shape == (len(log), 4) and best.run(log, again).note == ""
+    assert best.run_float(log, again).signals["logits"].shape == (len(log), len(outputs.OUTPUTS))
+    assert best.run(log, again).note == ""
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
     assert again.c_sources() and CHANNELS == trained.int8.layers[0].weights.shape[1] // SMALL.first_taps

@@ -15,7 +15,7 @@ from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
-from airtouch.logs.flight_log import GYRO, FlightLog
+from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from made_flight import SMALL, made_flight
 
 
@@ -52,6 +52,15 @@ def test_a_detector_that_needs_all_sensors_refuses_a_log_without_one():
     evaluate.check(log, 1)
     with pytest.raises(AirTouchError, match="acc_x_mps2"):
         evaluate.check(log)
+
+
+def test_a_vehicle_that_flies_below_the_threshold_of_the_detectors_is_refused():
+    """Its height tells that it flies, but the pipeline goes by the motors: each edge would be missed."""
+    log = made_flight(4)
+    low = log.with_columns({name: log[name] * 14000.0 / log[name].max() for name in PWM})
+    assert logs.airborne(low).any()
+    with pytest.raises(AirTouchError, match="no flight in this log"):
+        evaluate.check(low)
 
 
 def test_the_rates_alone_tell_flight_from_ground(flights):

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -175,13 +176,16 @@ static void tapMean(void) {
 /** The PARAM group as a client finds it before the app has started. */
 static void tables(void) {
   for (const variableEntry_t *entry = logs; entry->name != NULL; entry++) {
-    printf("log %s.%s %d\n", logGroup, entry->name, entry->type);
+    const bool function = entry->type & LOG_BY_FUNCTION;
+    const size_t field = function ? offsetof(appLog_t, health) : (size_t)((char *)entry->address - (char *)&core.log);
+    printf("log %s.%s %d %zu\n", logGroup, entry->name, entry->type & ~LOG_BY_FUNCTION, field);
   }
   for (const variableEntry_t *entry = params; entry->name != NULL; entry++) {
     const double value = entry->type == PARAM_FLOAT   ? (double)*(float *)entry->address
                          : entry->type == PARAM_UINT8 ? *(uint8_t *)entry->address
                                                       : *(uint16_t *)entry->address;
-    printf("param %s.%s %d %a\n", paramGroup, entry->name, entry->type, value);
+    const size_t field = (size_t)((char *)entry->address - (char *)&wantedParams);
+    printf("param %s.%s %d %zu %a\n", paramGroup, entry->name, entry->type, field, value);
   }
 }
 

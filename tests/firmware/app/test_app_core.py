@@ -201,6 +201,23 @@ def test_an_old_tick_is_no_stalled_app(now, last, stalled):
     assert lib.appHostStalled(now, last, 50) == stalled
 
 
+@pytest.mark.parametrize("detector", ["best", "best-gap8", "paper-gap8", "paper-stream-gap8"])
+def test_a_drone_that_landed_on_a_platform_is_over_none_on_the_ground_and_in_the_next_flight(recorded, detector):
+    _, acc, gyro, pwm = recorded[0][0]
+    drone, over, i = Drone(detector), [], 0
+    while not drone.app.log.over:  # the first flight ends behind its first entry
+        drone.step(acc[i], gyro[i], pwm[i])
+        i += 1
+    for _ in range(100):
+        drone.step((0.0, 0.0, 9.81), (0.0,) * 3, (0.0,) * 4)
+        over.append(drone.app.log.over)
+    assert 1 not in over[20:]
+    for k in range(i - 100):  # the same flight again, to before its first entry
+        drone.step(acc[k], gyro[k], pwm[k])
+        assert drone.app.log.over == 0
+    assert drone.app.log.edge == 1 and drone.app.log.edges == 1
+
+
 def test_load_and_late_steps_are_logged():
     app = AppCore({"detector": 1})
     at_rest = (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (0.0,) * 4

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from airtouch.reference.floor_height import FloorHeight
+from patience import HANG_S
 
-SOURCE = Path(__file__).parents[3] / "firmware/app/core/floor_height.c"
+HERE = Path(__file__).parent
+CORE = HERE.parents[2] / "firmware/app/core"
+SOURCE = CORE / "floor_height.c"
 MS = 25
 TOP = 0.72
 
@@ -22,10 +25,15 @@ class State(ctypes.Structure):
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
+def compiler():
+    path = shutil.which("cc") or shutil.which("gcc")
+    if path is None:
         pytest.skip("no C compiler on this machine")
+    return path
+
+
+@pytest.fixture(scope="module")
+def library(compiler, tmp_path_factory):
     out = tmp_path_factory.mktemp("floor") / "floor.so"
     subprocess.run([compiler, "-std=c11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
                     "-ffp-contract=off", "-shared",
@@ -203,3 +211,12 @@ def test_flow_is_scaled_to_the_platform(drone):
     drone.fly(profile((0.0, 40), (0.5, 40)))
     assert flow(0.8) == pytest.approx(0.3 / 0.8, abs=1e-3) == drone.reference.flow(0.8)
     assert flow(0.52) == pytest.approx(0.08 / 0.52, abs=1e-3) and flow(0.0) == 1.0
+
+
+def test_a_task_that_comes_in_while_another_looks_the_variables_up_uses_none_that_is_not_looked_up(compiler, tmp_path):
+    program = tmp_path / "port"
+    subprocess.run([compiler, "-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion",
+                    f"-I{HERE / 'crazyflie'}", f"-I{CORE}", HERE / "height_driver.c", SOURCE, "-lm", "-o", program],
+                   check=True)
+    process = subprocess.run([program], capture_output=True, text=True, timeout=HANG_S)
+    assert (process.returncode, process.stdout) == (0, "atHeight.floor atHeight.enable\n"), process.stderr

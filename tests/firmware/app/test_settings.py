@@ -179,7 +179,7 @@ def test_switched_off_it_sends_and_finds_nothing_and_comes_back(flight):
     drone.fly(flight, stop=500)
     drone.app.set_params(enable=0)
     packets_sent = drone.sent
-    assert drone.fly(flight) == [] and drone.sent == packets_sent
+    assert drone.fly(flight) == [] and drone.sent == packets_sent and drone.health == set()
     drone.app.set_params(enable=1)
     drone.fly(flight, stop=500)
     assert LINK[drone.app.log.link] == "up"

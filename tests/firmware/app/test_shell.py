@@ -2,6 +2,7 @@
 tasks, parameters, log tables, and what of CPX it touches."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,6 +13,8 @@ import objects
 import sanitized
 from airtouch import vehicle as vehicles
 from airtouch.detector.shared import vehicle_header
+from airtouch.kernels.app_core import PARAM_TYPES
+from airtouch.kernels.library import ffi
 from airtouch.simulation import scenario
 from airtouch.sitl import app as sitl
 from airtouch.sitl.drone import Drone
@@ -95,14 +98,34 @@ def test_the_tap_gives_means(shells, story):
 
 def test_the_virtual_crazyflie_has_the_same_defaults(shells):
     lines = [line.split() for line in run(shells["app-config"], "tables").splitlines()]
-    params = {words[1].split(".")[1]: float.fromhex(words[3]) for words in lines if words[0] == "param"}
+    params = {words[1].split(".")[1]: float.fromhex(words[4]) for words in lines if words[0] == "param"}
     virtual = Drone(scenario.draw_flight(scenario.load("paper-9cm"), 0, 0), vehicles.load(), 0, 0, [], ai_deck=True)
     assert params and {p.name.split(".")[1]: p.default for p in virtual.app.parameters()} == params
 
 
+def test_the_virtual_crazyflie_has_the_same_tables(shells):
+    """Names, types, and which field each one is."""
+    lines = [line.split() for line in run(shells["app-config"], "tables").splitlines()]
+    compiled = {(group, name.split(".")[1]): (int(kind), int(field)) for group, name, kind, field, *_ in lines}
+    kinds = {"log": {"uint8_t": 1, "uint16_t": 2, "uint32_t": 3, "float": 7},  # log.h, param.h
+             "param": {"float": 6, "uint8_t": 8, "uint16_t": 9}}
+    virtual = {("log", name): (kinds["log"][kind], ffi.offsetof("appLog_t", field, *([at] if at >= 0 else [])))
+               for name, (kind, field, at) in sitl.LOGS.items()}
+    virtual |= {("param", name): (kinds["param"][PARAM_TYPES[field]], ffi.offsetof("appParams_t", field))
+                for name, field in sitl.PARAMS.items()}
+    assert compiled == virtual
+
+
+def test_the_page_lists_every_variable_and_parameter():
+    page = (ROOT / "host/docs/flash.md").read_text("utf-8")
+    params, logs = (re.search(rf"\n\| {head} `airtouch\.`.*?\n\n", page, re.DOTALL)[0] for head in ("parameter", "log"))
+    for table, names in ((params, sitl.PARAMS), (logs, sitl.LOGS)):
+        rows = [row.split("|")[1] for row in table.strip().splitlines()[2:]]
+        assert sorted(re.findall(r"\w+", " ".join(rows))) == sorted(names)
+
+
 def test_names_are_no_longer_than_the_firmware_takes(shells):
     names = [line.split()[1] for line in run(shells["app-config"], "tables").splitlines()]
-    assert len(names) == len(sitl.LOGS) + len(sitl.PARAMS)
     assert max(len(name.replace(".", "")) for name in names) + 2 <= LONGEST_NAME
     assert not [name for name in names if not name.replace(".", "").isalnum()]
 

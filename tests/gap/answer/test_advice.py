@@ -59,6 +59,19 @@ def test_effects_that_look_alike_come_first_and_what_is_missing_last():
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
 
 
+@pytest.mark.parametrize(("group", "told"), [
+    (("mass", "thrust_coefficient"), ["mass from thrust_coefficient"]),
+    (("actuator_delay", "inertia", "motor_lag"), ["actuator_delay from motor_lag", "inertia from motor_lag"]),
+    (("inertia", "mass", "thrust_coefficient"), ["mass from thrust_coefficient",
+                                                 "inertia from mass from thrust_coefficient"]),
+    (("mass", "none"), ["mass from no effect"]),
+    (("blade_flapping", "none", "rotor_drag"), ["blade_flapping from rotor_drag",
+                                                "blade_flapping and rotor_drag from no effect"])])
+def test_a_remedy_is_that_of_the_effects_it_names(group, told):
+    steps = next_steps(replace(diagnosis(), baseline=BASELINE, indistinguishable=(group,)), WITH_GYRO, VEHICLE)
+    assert [step.text.split(":")[0].removeprefix("To tell ") for step in steps[:-1]] == told
+
+
 def test_advised_commands_are_valid():
     """Every effect's command is taken by `simulate` as it stands, and every mission advised can be loaded."""
     from airtouch.crazyflie import mission

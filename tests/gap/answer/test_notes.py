@@ -3,8 +3,10 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import pytest
+
 from airtouch.gap.answer.named_effects import with_random_part
-from airtouch.gap.answer.notes import at_end_of_range, mostly_random, signs_not_shown
+from airtouch.gap.answer.notes import at_end_of_range, cannot_be_replayed, mostly_random, signs_not_shown
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import random_part_of
 
@@ -31,6 +33,15 @@ def test_a_wake_that_shakes_more_than_a_simulator_can_be_given_has_a_note():
     (note,) = mostly_random([NamedEffect("mass", {"fraction": Quantity(0.1)}), wake(0.05)])
     assert note.startswith("downwash: it shakes at least 5 times as much as it pushes")
     assert mostly_random([wake(0.0)]) == [] and mostly_random([wake(1e-4)]) == []
+
+
+@pytest.mark.parametrize(("names", "inference", "words"), [
+    (("mass", "range_bias", "flow_latency"), None, "range_bias and flow_latency cannot be seen"),
+    (("mass", "range_bias"), None, "range_bias cannot be seen"), (("mass",), None, None),
+    (("mass", "range_bias"), SimpleNamespace(), None)])
+def test_a_candidate_that_a_replay_does_not_show_is_said_so(names, inference, words):
+    sentences = cannot_be_replayed(SimpleNamespace(single_effects=dict.fromkeys(names), inference=inference))
+    assert [s[:len(words)] for s in sentences] == [words] if words else sentences == []
 
 
 def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():

@@ -132,7 +132,7 @@ def test_reason_of_the_best_effect_where_the_answer_is_unknown():
                                                      "only up to 20 may be left")
     over_predicting = selection(lost=(60.0, cell_numbers(REST_VIEW, 1, COLUMN["torque_z"])))
     assert why_not(over_predicting, "mass", "unknown") == (
-        "it loses 60 nats where it says more than the flights show, most in torque_z at 0.6 to 2 Hz at rest, "
+        "it loses 60 nats where it says more than the flights show, most in yaw torque at 0.6-2 Hz at rest, "
         "but only up to 18 may be chance")
 
 

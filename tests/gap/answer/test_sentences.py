@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from airtouch.gap.answer.sentences import sentences
-from airtouch.gap.result import REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity
+from airtouch.gap.result import FITTED, HELD_OUT, REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -26,13 +26,12 @@ def test_mostly_is_said_of_the_largest_cell_alone(other, begin):
     assert where.startswith(begin) and which.startswith("Its cause is ground effect")
 
 
-@pytest.mark.parametrize(("seconds", "others", "data"), [
-    ((("one.csv", 1.0, 2.0),), 0, "that it was fitted to"), ((), 0, "held out"),
-    ((("one.csv", 1.0, 2.0),), 1, "held out")])
-def test_a_passing_effect_alone_is_measured_on_what_it_was_fitted_to(seconds, others, data):
-    effects = (NamedEffect("downwash", {}, seconds), *[NamedEffect("mass", {})] * others)
-    how_far = sentences(diagnosis([cell("force_z", "hover", 1.0, after=0.1)], effects=effects))[2]
-    assert f"of the gap above the floor on data {data}, from 4 to" in how_far
+@pytest.mark.parametrize(("judged_on", "others", "data"), [
+    (FITTED, 0, "that it was fitted to"), (FITTED, 1, "that they were fitted to"), (HELD_OUT, 0, "held out")])
+def test_the_data_are_said_on_which_the_gap_is_measured(judged_on, others, data):
+    effects = (NamedEffect("downwash", {}), *[NamedEffect("mass", {})] * others)
+    judged = replace(diagnosis([cell("force_z", "hover", 1.0, after=0.1)], effects=effects), judged_on=judged_on)
+    assert f"of the gap above the floor on data {data}, from 4 to" in sentences(judged)[2]
 
 
 def test_no_cause_is_given_without_a_headline_cell():

@@ -10,7 +10,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
-from airtouch.gap.result import Closure, Quantity
+from airtouch.gap.result import FITTED, Closure, Quantity
 from gap_flights import VEHICLE, flight, noise
 
 
@@ -71,6 +71,7 @@ def test_a_centred_weight_is_named_unless_it_is_left_out_itself(left_out, named)
     nominal = [hovering(seed) for seed in (1, 2, 3)]
     result = balance_result.diagnosis([hovering(4, 1.15)], nominal, VEHICLE, without=left_out)
     assert not {r.name for r in result.ranking} & set(left_out)
+    assert result.judged_on == result.plain()["judged_on"] == FITTED  # of one mean pattern nothing can be held out
     mass = [e.parameters["fraction"] for e in result.effects if e.name == "mass"]
     assert bool(mass) == named
     if named:

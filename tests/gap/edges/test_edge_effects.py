@@ -1,12 +1,16 @@
 """What effects add at edges against flights that were flown with them, and what is left of it without a velocity."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
+from airtouch.gap.edges import edge_effects
 from airtouch.gap.edges.edge_effects import added_response
 from airtouch.gap.edges.edge_response import KINDS, edge_floor_of, edges_of, logged, whitened
 from airtouch.gap.flights.flight import ready
+from airtouch.logs.edges import Edge
 from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.simulation import batch, scenario
 from airtouch.simulation.effects import activate
@@ -38,6 +42,13 @@ def mean_added(floor, flights, kind, effects):
     """What effects add to it by the simulator."""
     return np.mean([added_response(floor, f, e, activate(effects)) for f in flights for e in edges_of(f)
                     if e.kind == kind], axis=0)
+
+
+@pytest.mark.parametrize(("height", "platform"), [(0.34, 0.13), (0.449, 0.2), (0.45, 0.31)])
+def test_the_platform_simulated_is_as_high_as_the_one_flown_over(monkeypatch, height, platform):
+    monkeypatch.setattr(edge_effects, "edges_of", lambda _: [Edge("entry", 100, height, height - platform)])
+    crossing = edge_effects.crossing_of(SimpleNamespace(log=FlightLog({}, {})))
+    assert crossing.height_m - crossing.clearance_m == pytest.approx(platform, abs=0.011)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.flights.fitness import cannot_of, cannot_tell, stamped_at_arrival, without_bad_columns
+from airtouch.gap.flights.fitness import cannot_of, cannot_tell, notes_of, stamped_at_arrival, without_bad_columns
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
 SAMPLES, HEIGHT = 1000, 0.4  #: 10 s of a hover, m
@@ -41,8 +41,8 @@ def test_a_channel_that_stands_still_is_named_with_the_share_of_the_flight():
     rates = hover()["gyro_y_radps"].copy()
     rates[250:500] = rates[250]
     _, notes = without_bad_columns(hover(gyro_y_radps=rates, gyro_z_radps=np.zeros(SAMPLES)))
-    assert notes == ("hover.csv: gyro_y_radps does not change in 25% of the flight",
-                     "hover.csv: gyro_z_radps does not change in 100% of the flight")
+    assert notes == ("gyro_y_radps does not change in 25% of the flight",
+                     "gyro_z_radps does not change in 100% of the flight")
 
 
 def test_a_motor_at_its_limit_a_height_that_is_held_and_a_simulated_battery_are_no_fault():
@@ -68,6 +68,12 @@ def test_rows_of_the_authors_logs_are_stamped_at_arrival_in_converted_logs_too(m
     log = FlightLog(hover().columns, meta)
     assert stamped_at_arrival(log) is at_arrival
     assert any("those of arrival" in reason for reason in cannot_tell(log)) is at_arrival
+
+
+def test_a_note_has_the_name_of_its_flight_once_or_the_number_of_flights():
+    flights = [("a/b.csv", ("stuck", "cut off")), ("c.csv", ("stuck",)), ("d.csv", ())]
+    assert notes_of(flights, "baseline flights") == ["2 of 3 baseline flights: stuck", "b.csv: cut off"]
+    assert notes_of([("a.csv", ("stuck",))]) == ["a.csv: stuck"] and notes_of([]) == []
 
 
 def test_a_reason_is_told_once_with_the_number_of_flights_where_it_is_not_all():

@@ -1,12 +1,14 @@
 """A flight's clock: what is lost, what comes late, and what nobody can tell."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gap_flights
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready_flights, with_gyro_if_any
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
@@ -26,6 +28,23 @@ def without(log, *rows):
 def as_flight(log):
     (flight,) = ready_flights([log], VEHICLE, [])
     return flight
+
+
+def test_motors_below_the_threshold_fly_by_the_height_and_a_note_says_so(log):
+    """Commands of less than 15000, as of a strong vehicle: the diagnosis found no flight in it."""
+    weak = as_flight(log.with_columns({name: log[name] * 14000.0 / log[name].max() for name in PWM}))
+    assert np.flatnonzero(weak.phase != KINDS.index("ground")).size > 0.9 * np.sum(log["zrange_m"] > 0.1)
+    assert any("never passes 15000" in note for note in weak.notes)
+    assert not any("never passes" in note for note in as_flight(log).notes)
+
+
+def test_the_threshold_of_the_vehicle_file_tells_what_is_flight(log):
+    """The same commands, by a vehicle that flies at them and by one that idles."""
+    low = log.with_columns({name: log[name] * 14000.0 / log[name].max() for name in PWM})
+    (armed,) = ready_flights([low], replace(VEHICLE, arm_pwm=3000.0), [])
+    mean = np.mean([low[name] for name in PWM], axis=0)
+    in_air = armed.phase != KINDS.index("ground")
+    assert in_air[mean > 3000.0].mean() > 0.95 and not any("never passes" in note for note in armed.notes)
 
 
 def test_a_row_lost_in_mid_flight_is_lost_and_no_jitter(log):
@@ -54,6 +73,27 @@ def test_rows_that_come_late_by_turns_are_jitter(log):
     late = np.random.default_rng(0).normal(0.0, 1e-3, len(log))
     flight = as_flight(FlightLog({**log.columns, "t_s": log["t_s"] + late}, log.meta))
     assert flight.clock_s.std() == pytest.approx(1e-3, rel=0.05) and not flight.lost.any()
+
+
+def test_a_hole_of_seconds_in_what_is_measured_is_no_evidence_and_no_lost_row(log):
+    """A log of 200 Hz without 2 s of its rows, and one of 100 Hz without the gyro's values then."""
+    fast = at_rate(log, 200)
+    hole = FlightLog({k: np.delete(v, np.arange(1400, 1800)) for k, v in fast.columns.items()}, fast.meta)
+    silent = log.with_columns({"gyro_y_radps": np.where(np.abs(np.arange(len(log)) - 800) < 100, np.nan,
+                                                        log["gyro_y_radps"])})
+    for one in (hole, silent):
+        flight = as_flight(one)
+        assert not flight.usable[703:897].any() and flight.bridged[703:897].all() and not flight.lost.any()
+        assert flight.usable[500:690].all() and flight.usable[910:1000].all()
+        (note,) = flight.notes
+        assert "2.0 s in the air are no evidence" in note
+
+
+def test_a_channel_that_is_logged_ten_times_slower_stays_evidence(log):
+    i = np.arange(len(log))
+    slow = np.where((i > 400) & (i < 1200) & (i % 10 > 0), np.nan, log["gyro_y_radps"])
+    flight = as_flight(log.with_columns({"gyro_y_radps": slow}))
+    assert np.array_equal(flight.usable, as_flight(log).usable) and not flight.bridged.any() and not flight.notes
 
 
 def test_without_a_down_range_the_height_comes_from_the_position(log):
@@ -95,6 +135,15 @@ def test_a_slower_log_is_refused(log, with_clock):
         slow = FlightLog({k: v for k, v in slow.columns.items() if k != "t_s"}, {"sample_period_s": 0.02})
     assert not list(ready_flights([slow], VEHICLE, reasons))
     assert "logged at 50 Hz; the diagnosis needs 100 Hz or more" in reasons[0]
+
+
+@pytest.mark.parametrize("unknown", [0, 1, 3])
+def test_a_clock_that_runs_backwards_is_refused_though_times_are_missing_there(log, unknown):
+    time = np.where(np.arange(len(log)) < 900, log["t_s"], log["t_s"] - 3.0)
+    time[900:900 + unknown] = np.nan
+    reasons = []
+    assert not list(ready_flights([log.with_columns({"t_s": time})], VEHICLE, reasons))
+    assert f"sample {900 + unknown}: the clock runs backwards by 2.9" in reasons[0]
 
 
 def test_a_clock_that_counts_from_1970_is_a_clock(log):

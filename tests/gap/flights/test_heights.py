@@ -6,6 +6,7 @@ import pytest
 from airtouch.gap.flights.clock import PERIOD_S
 from airtouch.gap.flights.heights import MARKER_M, rotor_heights, standing_z
 from airtouch.logs.flight_log import FlightLog
+from airtouch.simulation.body.rotation import as_matrix
 
 
 def log_of(**columns):
@@ -29,6 +30,16 @@ def test_the_edge_passes_under_each_rotor_when_it_is_there():
     low = height - (0.8 - 0.02) < -0.24
     first = np.argmax(low[50:], axis=0) + 50
     np.testing.assert_allclose(first, edge - np.round(x / 0.5 / PERIOD_S), atol=1)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 25.0])
+def test_the_beam_of_a_tilted_vehicle_is_longer_than_its_height(degrees):
+    """Rotors in one plane, 2 cm along the body's axis above the sensor, which is 0.3 m over the floor."""
+    n, tilt = 20, np.radians(degrees)
+    turn = as_matrix(np.zeros(n), np.full(n, tilt), np.zeros(n))
+    log = log_of(zrange_m=np.full(n, 0.3 / np.cos(tilt)))
+    height = rotor_heights(log, turn, row_of(np.zeros(4), np.zeros(4)), np.zeros(n, bool))
+    np.testing.assert_allclose(height, 0.3 + 0.02 * np.cos(tilt))
 
 
 def test_without_a_range_the_floor_is_flat_and_standing_is_known():

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.signatures.signature import CLOCK, MEAN, SIGNATURES, SPECTRUM, free_of, signature_of
+from airtouch.gap.relations.library import shipped
+from airtouch.gap.signatures.signature import (
+    CLOCK,
+    MEAN,
+    RELATIONS_ONLY,
+    SIGNATURES,
+    SPECTRUM,
+    free_of,
+    signature_of,
+)
 from airtouch.simulation.effects import EFFECTS, NAMES
 from airtouch.simulation.effects.effect import Effect, Parameter
 
@@ -23,6 +32,12 @@ def test_a_record_names_parameters_of_its_effect_with_values_in_their_bounds(nam
     assert bool(signature.spectrum) <= (signature.shows_in == SPECTRUM)
     assert not signature.factors or all(parameters[p].neutral == 1.0 for p in signature.free)
     assert signature.companion == "" or signature.companion in EFFECTS
+
+
+def test_every_effect_of_the_package_has_a_record_or_is_said_to_be_shown_by_relations_alone():
+    assert {*SIGNATURES, *RELATIONS_ONLY} == set(NAMES) and not SIGNATURES.keys() & set(RELATIONS_ONLY)
+    library = shipped()
+    assert library is not None and library.effects.issuperset(RELATIONS_ONLY)
 
 
 def test_only_an_effect_with_a_random_part_is_never_tried_without_it():

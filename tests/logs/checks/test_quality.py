@@ -83,6 +83,20 @@ def test_segments_of_a_made_flight():
                      "ground"]
 
 
+def test_a_down_range_without_a_value_is_not_the_ground():
+    """With `zrange_m` all NaN the whole flight was on the ground, whatever `z_m` said."""
+    motors = np.r_[np.zeros(200), np.full(1600, 40000.0), np.zeros(200)]
+    height = np.r_[np.zeros(200), np.linspace(0, 0.8, 100), np.full(1400, 0.8), np.linspace(0.8, 0, 100), np.zeros(200)]
+    log = FlightLog({"t_s": np.arange(2000) * 0.01, "zrange_m": np.full(2000, np.nan)} | dict.fromkeys(PWM, motors),
+                    {"source": "made", "warnings": []})
+    alone = logs.segments(log)
+    assert [(s.kind, s.start, s.stop) for s in alone] == [("ground", 0, 200), ("hover", 200, 1800),
+                                                          ("ground", 1800, 2000)]
+    with_height = logs.segments(log.with_columns({"z_m": height}))
+    assert [s.kind for s in with_height] == ["ground", "take-off", "hover", "landing", "ground"]
+    assert not any("no flight" in w for w in logs.check(log).warnings)
+
+
 def test_known_faults_of_recorded_flights_are_reported(flights):
     folder = flights / "airtouch"
     report = logs.check(logs.read(folder / "imu_data_0102-2131.csv.gz"))  # gyro duplicates acc

@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM
@@ -63,6 +64,20 @@ def test_the_authors_files_of_other_widths_have_their_columns():
     assert not log.has(PWM[0])
     log = parse(lines([0, 0, math.sqrt(0.5), math.sqrt(0.5), LEVEL, 0.5]), "f")  # 6
     assert first(log, ATTITUDE) == pytest.approx([0, 0, math.pi / 2])
+
+
+@pytest.mark.parametrize(("name", "header", "assumed"), [
+    ("pad_healthy_E1_log00.csv", "timestamp_ms,stateEstimate.ax,stateEstimate.ay,stateEstimate.az", False),
+    ("mine.csv", "timestamp_ms,stateEstimate.ax,stateEstimate.ay,stateEstimate.az", True),
+    ("brushed_jana23.csv", "timestamp_ms,gyro.x,gyro.y,gyro.z", False),
+    ("log00.csv", "timestamp_ms,gyro.x,gyro.y,gyro.z", True)])
+def test_a_vehicle_that_no_file_declares_is_assumed_with_a_warning(name, header, assumed):
+    """Crazyflie variables come from any Crazyflie: a uSD log of a heavier one was taken for the bare 2.1 unsaid."""
+    log = parse(f"{header}\n0,1,2,3\n10,1,2,3\n".encode(), name)
+    craft, warning = vehicles.of_log(log.meta)
+    assert craft.name == log.meta["vehicle"] == "crazyflie-2.1"
+    assert ("names no vehicle; crazyflie-2.1 is assumed" in (warning or "")) == assumed
+    assert vehicles.of_log(log.meta | {"vehicle": "crazyflie-2.1-flow"}) == (vehicles.load("crazyflie-2.1-flow"), None)
 
 
 def test_unknown_width_names_the_known_ones():

@@ -89,17 +89,19 @@ def test_one_topic_of_each_kind_gives_no_warning(bag_of):
     assert log.meta["warnings"] == []
 
 
-@pytest.mark.parametrize(("kind", "commands", "share"), [
-    (FLOATS, [0.5, 0.5, 0.5, 1.001], [0.5, 0.5, 0.5, 1.0]),  # one overshoot turned the whole message into PWM 0.5
-    (FLOATS, [1250.0, 1500.0, 2000.0, 1000.0], [0.25, 0.5, 1.0, 0.0]),  # us
-    (SHORTS, [1250, 1500, 2000, 1000], [0.25, 0.5, 1.0, 0.0]),
-    (SHORTS, [16384, 32768, 65535, 1], [16384 / 65535, 32768 / 65535, 1.0, 1 / 65535]),
-    (FLOATS, [16384.0, 32768.0, 65535.0, 0.5], [16384 / 65535, 32768 / 65535, 1.0, 0.5 / 65535])])
-def test_the_unit_of_the_motors_is_that_of_the_whole_topic(bag_of, kind, commands, share):
+@pytest.mark.parametrize(("kind", "commands", "share", "unit"), [
+    (FLOATS, [0.5, 0.5, 0.5, 1.001], [0.5, 0.5, 0.5, 1.0], "0 to 1"),  # one overshoot made it all PWM 0.5
+    (FLOATS, [1250.0, 1500.0, 2000.0, 1000.0], [0.25, 0.5, 1.0, 0.0], "2000 us"),
+    (SHORTS, [1250, 1500, 2000, 1000], [0.25, 0.5, 1.0, 0.0], "2000 us"),
+    (SHORTS, [16384, 32768, 65535, 1], [16384 / 65535, 32768 / 65535, 1.0, 1 / 65535], "PWM"),
+    (FLOATS, [16384.0, 32768.0, 65535.0, 0.5], [16384 / 65535, 32768 / 65535, 1.0, 0.5 / 65535], "PWM")])
+def test_the_unit_of_the_motors_is_that_of_the_whole_topic(bag_of, kind, commands, share, unit):
     still = [0.0] * 4  # on the ground
     log = bag_of({"/motor_cmd": (kind, "", [still] * 5 + [commands] * 15)})
     for i in range(4):
         np.testing.assert_allclose(log[f"m{i + 1}_pwm"], np.r_[np.zeros(5), np.full(15, 65535 * share[i])], atol=1e-2)
+    (note,) = log.meta["warnings"]
+    assert "/motor_cmd" in note and unit in note
 
 
 def test_motors_without_a_header_keep_their_place_where_the_headers_count_from_zero(bag_of):
@@ -108,7 +110,8 @@ def test_motors_without_a_header_keep_their_place_where_the_headers_count_from_z
     log = bag_of({"/motor_pwm": (SHORTS, "", commands), "/tof": (RANGE, "", np.full(20, 0.5))},
                  begin_ns=1_796_000_000 * 10**9)
     assert log["m1_pwm"] == pytest.approx(commands[:, 0], abs=2000.0)  # one sample: 1e9 s is exact to 1e-7 s
-    assert (log["zrange_m"] == 0.5).all() and log.meta["warnings"] == []
+    assert (log["zrange_m"] == 0.5).all()
+    assert not any("empty" in w or "left out" in w for w in log.meta["warnings"])
 
 
 def test_a_column_that_is_empty_in_the_flight_is_named(bag_of):

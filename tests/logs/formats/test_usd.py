@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import damaged
+from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import ACC, GYRO
@@ -40,6 +41,7 @@ def _time(version, i):
 def test_files_of_both_versions_give_columns_in_si_units(version):
     log = parse(usd_log(version), "log00")
     assert len(log) == 50 and log.meta["format"] == f"usd-{version}" and not log.meta["warnings"]
+    assert "crazyflie-2.1 is assumed" in vehicles.of_log(log.meta)[1]  # no name of a drone in it
     np.testing.assert_allclose(log["t_s"], 0.1 + 0.001 * np.arange(50))
     np.testing.assert_allclose(log.stack(ACC)[0], [0.5 * 9.81, 0, 9.81], rtol=1e-6)
     np.testing.assert_allclose(log.stack(GYRO)[0], [np.pi / 2, 0, 0], rtol=1e-6)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import damaged
+from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import parse
 from airtouch.logs.flight_log import ACC, GYRO
@@ -46,11 +47,20 @@ def flight(n=50):
 def test_an_old_file_gives_columns_in_si_units():
     log = parse(old_log(flight()), "log00")
     assert len(log) == 50 and log.meta["format"] == "usd-0" and not log.meta["warnings"]
+    assert "crazyflie-2.1 is assumed" in vehicles.of_log(log.meta)[1]  # no name of a drone in it
     np.testing.assert_allclose(log["t_s"], 9 + 0.01 * np.arange(50))
     np.testing.assert_allclose(log.stack(ACC)[0], [0.5 * 9.81, 0, 9.81], rtol=1e-6)
     np.testing.assert_allclose(log.stack(GYRO)[0], [np.pi / 2, 0, 0], rtol=1e-6)
     np.testing.assert_array_equal(log["m1_pwm"], np.arange(50))
     assert log["vbat_V"][0] == pytest.approx(3.9)
+
+
+@pytest.mark.parametrize(("step", "in_doubt"), [(10, False), (500, False), (1000, True), (1004, True), (2000, False)])
+def test_a_step_that_may_be_either_unit_is_warned_of(step, in_doubt):
+    """1000 ticks are 1 kHz in microseconds and 1 Hz in milliseconds: the deck does both."""
+    rows = [struct.pack("<IH", 9000 + step * i, 3900) for i in range(20)]
+    warnings = parse(old_log(rows, ("tick(I)", "pm.vbatMV(H)")), "log00").meta["warnings"]
+    assert any("milliseconds" in w for w in warnings) == in_doubt
 
 
 def test_ticks_in_microseconds_give_seconds():

@@ -51,9 +51,11 @@ def test_imu_bias_shows_as_the_mean(steady):
 
 
 def flight_on_ground(effects):
+    """The first 20 s of a flight that begin on the ground, motors off."""
     from airtouch import vehicle as vehicles
-    scene = scenario.parse('[[mission.step]]\ndo = "wait"\ntime_s = 20.0\n', "ground")
-    return flight.fly(scene, vehicles.load(), 5, 0, effects=effects)
+    steps = 'step = [{do = "wait", time_s = 20.0}, {do = "take-off", height_m = 0.3}, {do = "hover", time_s = 2.0}]'
+    scene = scenario.parse(f"[mission]\n{steps}\n", "ground")
+    return flight.fly(scene, vehicles.load(), 5, 0, effects=effects).slice(0, 2000)
 
 
 @pytest.mark.parametrize("factor", [0.0, 1.0, 4.0])

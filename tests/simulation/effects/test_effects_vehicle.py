@@ -144,3 +144,15 @@ def test_firmware_compensation_undoes_the_sag(ideal, steady, firmware):
     commands = [command(p, v) for p, v in zip(pwm, volts, strict=True)]
     # the firmware takes thrust to follow PWM times voltage; here it follows a curve of PWM times voltage squared
     assert abs(commands[1] - commands[0]) < 0.6 * abs(pwm[1] - pwm[0])
+
+
+def test_a_command_that_is_lost_holds_the_one_before(vehicle):
+    pwm = np.tile(np.linspace(30000.0, 40000.0, 60)[:, None], (1, 4))
+    held, lost = pwm.copy(), pwm.copy()
+    held[20:25, 1] = held[19, 1]
+    held[:3, 2] = held[3, 2]
+    lost[20:25, 1] = [np.nan, np.inf, -np.inf, np.nan, np.nan]
+    lost[:3, 2] = np.nan
+    np.testing.assert_array_equal(rotor_speeds(lost, vehicle).rotor_speed, rotor_speeds(held, vehicle).rotor_speed)
+    lost[:, 0], held[:, 0] = np.nan, 0.0  # of a motor without any command: off
+    np.testing.assert_array_equal(rotor_speeds(lost, vehicle).rotor_speed, rotor_speeds(held, vehicle).rotor_speed)

@@ -89,8 +89,9 @@ def test_a_vehicle_with_any_other_value_is_read_or_refused(path, node):
 @given(text=st.text())
 @example(text="a = " + "9" * 5000)
 @example(text="a = " + "[" * 5000)
-def test_any_text_is_read_or_refused(parse, text):
-    refusal(parse, text)
+def test_text_that_names_nothing_is_refused(parse, text):
+    """A text drawn at random has no mission and no mass."""
+    assert refusal(parse, text)
 
 
 @pytest.mark.parametrize("path, node, key", [
@@ -105,6 +106,11 @@ def test_any_text_is_read_or_refused(parse, text):
     (("mission", "step", 5, "spacing_m"), 1e-9, "step 6"), (("mission", "step", 3, "distance_m"), 1e12, "step 4")])
 def test_the_refusal_names_the_key(path, node, key):
     assert key in (refusal(scenario.parse, tomli_w.dumps(put(WHOLE, path, node))) or "")
+
+
+@pytest.mark.parametrize("name", ["", "/", "two\nlines", "nul\0"])
+def test_a_name_that_no_file_can_have_is_refused(name):
+    assert "name = " in (refusal(scenario.parse, tomli_w.dumps(WHOLE | {"name": name})) or "")
 
 
 @pytest.mark.parametrize("key, value", [("arm_m", -0.03), ("motor_time_constant_s", 0), ("mass_kg", "text")])

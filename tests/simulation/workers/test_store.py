@@ -1,12 +1,15 @@
 """A folder of simulated flights keeps what the simulator did not write, and may hold damaged files of its own."""
 
 import csv
+import json
 import re
 from importlib import resources
+from unittest import mock
 
 import pytest
 from click.testing import CliRunner
 
+import airtouch
 from airtouch import logs
 from airtouch.cli.simulate import command
 from airtouch.errors import AirTouchError
@@ -50,7 +53,8 @@ def test_a_run_json_of_something_else_is_no_leave_to_remove(tmp_path):
     assert (tmp_path / "run.json").read_text() == "run.json"
 
 
-@pytest.mark.parametrize("text", ["file,use\nmine.csv,clean\n", store.HEAD + "\nmine.csv.gz,clean,0,,,,\n"])
+@pytest.mark.parametrize("text", ["file,use\nmine.csv,clean\n", store.HEAD + "\nmine.csv.gz,clean,0,,,,\n",
+                                  store.HEAD + "\n" + "x" * 200_000 + "\n"])
 def test_a_manifest_of_the_user_stays(tmp_path, text):
     (tmp_path / "manifest.csv").write_text(text)
     (tmp_path / "short.toml").write_text(SHORT)
@@ -70,6 +74,49 @@ def test_fewer_flights_of_the_same_request_leave_all_of_them_listed(tmp_path):
     with open(out / "manifest.csv") as file:
         listed = [row["file"] for row in csv.DictReader(file)]
     assert listed == [p.name for p in logs.files.in_folder(out)] and len(listed) == 2
+
+
+def test_a_manifest_that_cannot_be_read_is_one_line(tmp_path):
+    (tmp_path / "manifest.csv").mkdir()
+    with pytest.raises(AirTouchError, match="manifest.csv: cannot be read"):
+        store.open_folder(tmp_path, {})
+
+
+def run(folder, version=airtouch.__version__):
+    """Fly the folder's short scenario into its folder `out`, by an AirTouch of a version; the refusal or None."""
+    with mock.patch("airtouch.__version__", version):
+        result = CliRunner().invoke(command, [str(folder / "short.toml"), "--out", str(folder / "out")])
+    return result.exception and str(result.exception)
+
+
+def test_another_firmware_file_or_version_is_another_request(tmp_path):
+    firmware = tmp_path / "mine.toml"
+    firmware.write_text('base = "2026.08"\n')
+    (tmp_path / "short.toml").write_text(f"firmware = '{firmware}'\n" + SHORT)
+    assert run(tmp_path) is None and run(tmp_path) is None
+    assert "(other or not known: airtouch)" in run(tmp_path, "0.0.1")
+    firmware.write_text('base = "2026.08"\n[controller]\ntilt_limit_deg = 10\n')
+    assert "another request (other or not known: firmware_digest)" in run(tmp_path)
+    firmware.write_text('base = "2026.08"\nsummary = "the same settings"\n')
+    assert run(tmp_path) is None
+
+
+def test_flights_of_which_no_version_is_known_are_not_continued(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT)
+    assert run(tmp_path) is None
+    path = tmp_path / "out" / "run.json"
+    request = json.loads(path.read_text())
+    path.write_text(json.dumps({k: v for k, v in request.items() if k not in ("airtouch", "firmware_digest")}))
+    assert "not known: airtouch, firmware_digest)" in run(tmp_path)
+    assert list((tmp_path / "out").glob("*.csv.gz"))
+
+
+def test_a_name_with_a_comma_fills_and_continues_a_folder(tmp_path):
+    (tmp_path / "short.toml").write_text(SHORT.replace('"short"', "'a, \"b\"'"))
+    assert run(tmp_path) is None and run(tmp_path) is None
+    with open(tmp_path / "out" / "manifest.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["file"] for row in rows] == ['a, "b"_0_000000.csv.gz'] and rows[0]["wind"] == "none"
 
 
 def test_rows_of_the_manifest_that_the_user_edited_stay(tmp_path):

@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from airtouch import logs, vehicle
+from airtouch.cli.shared.flights import flights_of_folder
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import MANIFEST, flights_in
+from airtouch.logs.files import MANIFEST
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.rosbag import is_bag
 from airtouch.vehicle import Vehicle
@@ -51,7 +52,7 @@ def files_of(names: Sequence[str]) -> list[Path]:
         if path.is_dir() and is_bag(path):
             paths = [path]
         elif path.is_dir():
-            paths = flights_in(path)
+            paths = flights_of_folder(path)
         elif path.exists():
             if path.name == MANIFEST:  # which a shell's *.csv names too
                 if len(names) == 1:

@@ -1,4 +1,4 @@
-"""The folder of recorded flights."""
+"""Folders of recorded flights."""
 
 import os
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.files import MANIFEST
+from airtouch.logs.files import MANIFEST, flights_in, ignored
 
 SPEED_MPS = click.FloatRange(0, 100, min_open=True)  #: a commanded speed; no source: above any, in m/s
 
@@ -40,6 +40,15 @@ def data_folder(data_set: str = "") -> Path:
     The latter is looked for as by `find_flights`. The folder need not exist: `check_data_set` tells.
     """
     return Path(os.environ.get("AIRTOUCH_FLIGHTS") or _beside() or "../shared/flights") / data_set
+
+
+def flights_of_folder(folder: Path) -> list[Path]:
+    """The flight logs of a folder, as `files.flights_in`. Says on stderr how many of its files are none."""
+    flights, others = flights_in(folder), ignored(folder)
+    if others:
+        click.echo(f"airtouch: {folder}: {others} other {'file' if others == 1 else 'files'} in this folder, "
+                   "by name and content no flight logs", err=True)
+    return flights
 
 
 def check_data_set(folder: Path, *tables: str) -> None:

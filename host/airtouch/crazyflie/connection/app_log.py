@@ -20,7 +20,7 @@ HEALTH = {1: "a value was not finite", 2: "the GAP8 does not answer", 4: "the GA
           32: "another detector runs than the wanted one", 64: "the CPX queue was full",
           128: "a step began late", 256: "the app stands still", 512: "a log variable is missing",
           1024: "the estimator gives no horizontal acceleration: choose the Kalman filter or the 1 kHz tap",
-          2048: "the networks were trained for another vehicle"}
+          2048: "FR-CFAR runs alone: the networks were trained for another vehicle, or are none that the app takes"}
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.in_flight import flies_below
 from airtouch.parameters import SAMPLE_PERIOD_S
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
@@ -77,7 +78,7 @@ def check(log: FlightLog, spare: int = 0) -> None:
             raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
                                 "log the flight again or leave it out")
     flying, evidence = sensors.airborne_by(log)
-    if np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:
+    if flies_below(log) or np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:  # the detectors go by the motors alone
         raise AirTouchError(f"{log.source}: no flight in this log (less than 1 s of {evidence})")
     used = np.where(finite, channels, 0.0)[flying]
     for name, values, logged in zip(names, used.T, finite[flying].T, strict=True):

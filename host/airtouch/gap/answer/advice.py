@@ -3,14 +3,18 @@
 import shlex
 from collections.abc import Sequence
 
+from airtouch.gap.answer.words import joined
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.result import Diagnosis, NamedEffect, NextStep
-from airtouch.gap.signatures.alike import confusion_among
+from airtouch.gap.signatures.alike import confusions_among
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import PHASE_WORDS
 from airtouch.simulation.effects import EFFECTS, source_of
 from airtouch.vehicle import Vehicle, argument_of
 
+#: what tells an effect from none, which flights without a gyro alone may leave open
+MORE_FLIGHTS = ("hover again, and hover in more nominal flights for the baseline: the more of both, the smaller the "
+                "difference that shows")
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
 #: by phase, the mission with most of it; take-off and landing are in every one
@@ -23,7 +27,7 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -
     answer: complete but for these steps; flights: those that were diagnosed; vehicle: as declared.
     """
     argument = argument_of(vehicle)
-    steps = [_step_to_tell_apart(group) for group in answer.indistinguishable]
+    steps = [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
     if answer.verdict == "unknown":
         steps += _steps_for_open_gap(answer.headline, argument)
     if answer.verdict == "effect":
@@ -70,11 +74,15 @@ def collect_command(mission: str) -> str:
     return f"airtouch collect --uri {URI} --mission {mission} -n 3 --out more"
 
 
-def _step_to_tell_apart(group: tuple[str, ...]) -> NextStep:
-    """The step that tells the effects of a group from one another."""
-    confusion = confusion_among(group)
-    return NextStep(f"To tell {' from '.join(sorted(confusion.effects))}: {confusion.remedy}.",
-                    collect_command(confusion.mission) if confusion.mission else "")
+def _steps_to_tell_apart(group: Sequence[str]) -> list[NextStep]:
+    """The steps that tell the effects of a group from one another, and from "none" where that is in it."""
+    effects = [name for name in group if name != "none"]
+    steps = [NextStep(f"To tell {' from '.join(sorted(c.effects))}: {c.remedy}.",
+                      collect_command(c.mission) if c.mission else "")
+             for c in (confusions_among(effects) if len(effects) > 1 else [])]
+    if len(effects) < len(group):
+        steps.append(NextStep(f"To tell {joined(effects)} from no effect: {MORE_FLIGHTS}.", collect_command("hover")))
+    return steps
 
 
 def _steps_for_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:

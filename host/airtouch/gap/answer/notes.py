@@ -1,4 +1,4 @@
-"""Notes of a diagnosis on the effects that it names: what the flights leave open of their parameters."""
+"""Notes of a diagnosis: what the flights leave open of the effects named, and the candidates that they do not show."""
 
 from collections.abc import Sequence
 
@@ -6,6 +6,7 @@ from airtouch.gap.naming.judging import NEAR_BOUND, at_bound
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.candidates import term_of
+from airtouch.gap.signatures.signature import RELATIONS_ONLY
 from airtouch.gap.signatures.term import parameter_of
 from airtouch.simulation.effects import get
 
@@ -34,6 +35,15 @@ def mostly_random(effects: Sequence[NamedEffect]) -> list[str]:
             notes.append(f"{effect.name}: it shakes at least {most:g} times as much as it pushes, the most that a"
                          " simulator can be given; its strength is the least that shakes as much as the flights do")
     return notes
+
+
+def cannot_be_replayed(selection: Selection) -> list[str]:
+    """What these logs cannot tell where the replay names the effects: the candidates that it does not show."""
+    names = [n for n in RELATIONS_ONLY if n in selection.single_effects]
+    if selection.inference is not None or not names:
+        return []
+    return [f"{' and '.join(names)} cannot be seen: only the relations of the signals show them, of which no library "
+            "holds for these flights"]
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

@@ -12,8 +12,11 @@ from airtouch.gap.naming.unknown import (
 )
 from airtouch.gap.relations.inference import LEAST_EVIDENCE, Inference
 from airtouch.gap.result import Rejected
+from airtouch.gap.signals.channels import CHANNEL_WORDS
+from airtouch.gap.signatures.signature import RELATIONS_ONLY
 
 GAP_AT_FLOOR = "the gap as a whole is at its floor"
+NOT_REPLAYED = "only the relations of the signals show it, of which no library holds for these flights"
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
 
@@ -48,6 +51,8 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     """What an effect lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, hypothesis.name)
+    if hypothesis.name in RELATIONS_ONLY:
+        return NOT_REPLAYED
     least = selection.least_nats[hypothesis.name]
     if hypothesis.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)
@@ -108,9 +113,9 @@ def _remainder_in_words(selection: Selection, name: str) -> str:
 
 
 def cell_in_words(cell: int) -> str:
-    """A cell of the spectra as `force_z at 0 to 0.6 Hz at rest`: channel, band, and whether on the ground."""
+    """A cell of the spectra as `lift at 0-0.6 Hz at rest`: channel, band, and whether on the ground."""
     view, channel, (low, high) = place_of(cell)
-    return f"{channel} at {low:g} to {high:g} Hz{' at rest' if view == REST_VIEW else ''}"
+    return f"{CHANNEL_WORDS[channel]} at {low:g}-{high:g} Hz{' at rest' if view == REST_VIEW else ''}"
 
 
 def _why_beside(selection: Selection, step: Step) -> str:

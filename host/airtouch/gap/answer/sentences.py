@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from airtouch.gap.answer.words import joined, name_in_words, quantity
-from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
+from airtouch.gap.result import FITTED, REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
@@ -82,16 +82,11 @@ def _how_far(diagnosis: Diagnosis) -> str:
                 else "Over all the gap is at the floor, but the signals do not fit a flight without an effect.")
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
         return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
-    added = "it" if len(diagnosis.effects) == 1 else "them"
+    added, they = ("it", "it was") if len(diagnosis.effects) == 1 else ("them", "they were")
+    data = f"that {they} fitted to" if diagnosis.judged_on == FITTED else "held out"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
-            f"floor on data {_judged_on(diagnosis)}, from {short(before)} to {short(after)} times the floor"
+            f"floor on data {data}, from {short(before)} to {short(after)} times the floor"
             f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}.")
-
-
-def _judged_on(diagnosis: Diagnosis) -> str:
-    """On what data the gap is measured: those of a passing effect alone are those that it was fitted to."""
-    passes_alone = len(diagnosis.effects) == 1 and bool(diagnosis.effects[0].seconds)
-    return "that it was fitted to" if passes_alone else "held out"
 
 
 def _cells_in_words(cells: Sequence[Cell]) -> str:

@@ -28,18 +28,19 @@ from airtouch.gap.balance.hover_posterior import (
 from airtouch.gap.flights.fitness import cannot_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
+from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
-#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen
-WRONG, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
+#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen, those that a
+#: hover shows (`signature.WRONG` has others)
+WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
 LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
-NO_GYRO = ("no gyro: judged by the balance of the motors in hover and how unsteady it is; candidates that "
-           "leave both as they are were not tried")
+NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
+           "it is; candidates that leave both as they are were not tried")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 
 
@@ -78,7 +79,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     answer = Diagnosis(
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
-        shrink=closures[first].shrink if verdict == "effect" else None,
+        shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(probability_of, first, closures) if verdict == "effect" else None,
         notes=_notes(voltage, notes),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
@@ -92,7 +93,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
 def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
     """Gap before and after in standard deviations of the floor, and the fraction of it that closes, with its interval.
 
-    gap (4,): BALANCE from the nominal mean.
+    The hypothesis was fitted to this same gap: nothing is held out. gap (4,): BALANCE from the nominal mean.
     """
     spread = np.sqrt(base.variance[BALANCE])
 
@@ -117,8 +118,8 @@ def _gap(verdict: str, closure: Closure) -> OverallGap:
 
 
 def control_of(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
-    """The gap with a deliberately wrong effect; None where none of WRONG is surely wrong."""
-    wrong = next((n for n in WRONG if n in probability_of and n != first and probability_of[n] < WRONG_BELOW), None)
+    """The gap with a deliberately wrong effect; None where none of WRONG_IN_HOVER is surely wrong."""
+    wrong = next((n for n in WRONG_IN_HOVER if n != first and probability_of.get(n, 1.0) < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, closures[wrong])
 
 

@@ -37,7 +37,8 @@ LEAST_TOP_M = 0.02  #: height of a simulated platform at least; chosen
 class Crossing(NamedTuple):
     """A flight's way over a platform, rounded so that flights share a simulation.
 
-    height_m: over the floor; clearance_m: over the platform; speed_mps; length_m: of the platform along the way.
+    height_m: over the floor; clearance_m: over the platform, both to 10 mm, as the responses are in proportion to the
+    platform's height, their difference; speed_mps; length_m: of the platform along the way.
     """
 
     height_m: float
@@ -92,7 +93,7 @@ def crossing_of(flight: Flight) -> Crossing:
     seconds = (leave.sample - entry.sample) * PERIOD_S if entry and leave else ASSUMED_CROSSING_S
     speed = float(np.clip(speed, *SPEEDS_MPS))
     length = float(np.clip(seconds * speed, *LENGTHS_M))
-    return Crossing(round(high, 1), round(max(low, LEAST_CLEARANCE_M), 2), round(speed, 1), round(length, 1))
+    return Crossing(round(high, 2), round(max(low, LEAST_CLEARANCE_M), 2), round(speed, 1), round(length, 1))
 
 
 def exact_sensors(vehicle: Vehicle) -> Vehicle:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.heights import climbed
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.edges import Edge, true_edges
@@ -133,10 +134,7 @@ def _height(log: FlightLog, window: slice) -> np.ndarray:
         return interpolate_missing(log[POSITION[2]][window])
     if not log.has("zrange_m"):
         return np.full(BEFORE + AFTER, np.nan)
-    height = interpolate_missing(log["zrange_m"][window])
-    step = np.diff(height, prepend=height[0])
-    step[np.abs(step) > 0.5 * PLATFORM_STEP_M] = 0.0
-    return np.cumsum(step)
+    return climbed(interpolate_missing(log["zrange_m"][window]), 0.5 * PLATFORM_STEP_M)
 
 
 def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:

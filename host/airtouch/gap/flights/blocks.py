@@ -7,7 +7,9 @@ import numpy as np
 from airtouch.gap.flights.flight import PERIOD_S
 
 #: Edges of the bands in which a spectrum is judged: about octaves, no other source. The lowest band has the means, the
-#: last edge lies beyond half the log's rate, 50 Hz, which it so includes.
+#: last edge lies beyond half the log's rate, 50 Hz, which it so includes. They are not quite the bands of the map
+#: (`where.filter_bank.MAP_BANDS_HZ`): that has filters, which cross over at 0.5 Hz; a spectrum has bins, in the air
+#: 0.39 Hz apart, and 0.6 Hz lies between the second and the third.
 BANDS_HZ = (0.0, 0.6, 2.0, 6.0, 12.0, 25.0, 50.1)
 
 

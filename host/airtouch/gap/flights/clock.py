@@ -32,10 +32,12 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
     the band up to 50 Hz cannot be made up.
     """
     if log.has("t_s"):
-        backwards = np.flatnonzero(np.diff(log["t_s"]) < -BACKWARDS_S)
-        if len(backwards):
-            raise AirTouchError(f"{name}, sample {backwards[0] + 1}: the clock runs backwards by "
-                                f"{-np.diff(log['t_s'])[backwards[0]]:.3f} s; cut the log there")
+        known = np.flatnonzero(np.isfinite(log["t_s"]))
+        steps = np.diff(log["t_s"][known])
+        if (steps < -BACKWARDS_S).any():
+            first = int(np.argmax(steps < -BACKWARDS_S))
+            raise AirTouchError(f"{name}, sample {known[first + 1]}: the clock runs backwards by "
+                                f"{-steps[first]:.3f} s; cut the log there")
     time = interpolate_missing(log["t_s"]) if log.has("t_s") else np.arange(len(log)) * sample_period(log)
     period = _period(time)
     # lost rows lengthen the mean step, not the median

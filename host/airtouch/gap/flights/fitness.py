@@ -31,7 +31,7 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
     name = log.source
     if nothing_logged(log):
         raise AirTouchError(f"{name}: nothing was logged: every value of every channel is missing (NaN)")
-    notes = [f"{Path(name).name}: {w}" for w in log.meta.get("warnings", []) if "cut off" in str(w)]
+    notes = [str(w) for w in log.meta.get("warnings", []) if "cut off" in str(w)]
     log, unfit = _without_impossible_values(log)
     if unfit:
         notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
@@ -41,7 +41,7 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
                                 "compares the motor commands with the IMU's measurements")
     if len(log) < 2:
         raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
-    notes += [f"{Path(name).name}: {channel} does not change in {share:.0%} of the flight"
+    notes += [f"{channel} does not change in {share:.0%} of the flight"
               for channel, share in _stuck_shares(log).items()]
     return log, tuple(notes)
 
@@ -100,6 +100,19 @@ def cannot_tell(log: FlightLog) -> tuple[str, ...]:
     if not log.has("vx_mps", "vy_mps"):
         cannot.append("no velocity: drag, flapping and wind cannot be told from a constant push")
     return tuple(cannot)
+
+
+def notes_of(flights: Sequence[tuple[str, Sequence[str]]], which: str = "flights") -> list[str]:
+    """The notes on flights, each once: with the flight's name, or with the number of flights where several have it.
+
+    flights: name and notes of each flight; which: what these flights are, in words.
+    """
+    having: dict[str, list[str]] = {}
+    for name, notes in flights:
+        for note in notes:
+            having.setdefault(note, []).append(name)
+    return [f"{Path(names[0]).name if len(names) == 1 else f'{len(names)} of {len(flights)} {which}'}: {note}"
+            for note, names in having.items()]
 
 
 def cannot_of(flights: Sequence[Sequence[str]]) -> tuple[str, ...]:

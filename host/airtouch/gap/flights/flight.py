@@ -3,6 +3,7 @@
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
+from pathlib import Path
 
 import numpy as np
 
@@ -10,12 +11,14 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.flights.attitude import attitude, in_world_axes, world_force
 from airtouch.gap.flights.clock import PERIOD_S, at_100_hz, with_lost_rows
 from airtouch.gap.flights.contact import jolts, knocks, near_ground, within
-from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, stamped_at_arrival, without_bad_columns
+from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, notes_of, stamped_at_arrival, without_bad_columns
 from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.workspace import Workspace
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, PWM, FlightLog
-from airtouch.logs.segments import KINDS, segments
+from airtouch.logs.in_flight import flies_below_in_words
+from airtouch.logs.resample import LONGEST_BRIDGE_S
+from airtouch.logs.segments import KINDS, runs, segments
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.body.rotation import as_matrix
@@ -25,6 +28,10 @@ from airtouch.vehicle import Vehicle
 GROUND = KINDS.index("ground")
 #: height above standing, m, below which legs may touch in flight, and seconds before and after it; chosen
 TOUCH_M, TOUCH_S = 0.006, 0.05
+#: samples of a hole in a column up to which a straight line stands for what was measured, as where a log is resampled
+MOST_BRIDGED = round(LONGEST_BRIDGE_S / PERIOD_S)
+HOLE_NOTE = ("{:.1f} s in the air are no evidence: accelerations, rates or motor commands are missing there for more "
+             "than {:g} s at a time; they do not count as lost rows")
 
 
 @dataclass(frozen=True)
@@ -33,10 +40,11 @@ class Flight:
 
     signals (n, simulation.signals.COUNT): what effects see; acceleration (n, 3): specific force in body axes, m/s^2;
     rates (n, 3): of the gyro, rad/s, None without one; pwm (n, 4): motor commands, 16 bits; body_to_world (n, 3, 3):
-    rotation; phase (n,): places in `segments.KINDS`; usable (n,): neither lost nor close to a touch of the ground;
+    rotation; phase (n,): places in `segments.KINDS`; usable (n,): measured, and not close to a touch of the ground;
     clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure; lost (n,):
-    rows that did not arrive; touching (n,): in flight, so low that the legs may touch; notes, cannot: sentences on what
-    was left out of the log, and on what no diagnosis of it can tell.
+    rows that did not arrive; unmeasured (n,): rows that did, in a hole of a column of the IMU or of the motor commands
+    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; notes, cannot:
+    sentences on what was left out of the log, and on what no diagnosis of it can tell.
     """
 
     name: str
@@ -50,6 +58,7 @@ class Flight:
     usable: np.ndarray
     clock_s: np.ndarray
     lost: np.ndarray
+    unmeasured: np.ndarray
     touching: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
@@ -60,8 +69,13 @@ class Flight:
 
     @property
     def bridged(self) -> np.ndarray:
-        """Samples whose residual is not evidence, bool (n,): the row was lost, or the legs may touch the floor."""
-        return self.lost | self.touching
+        """Samples whose residual is not evidence, bool (n,): not measured, or the legs may touch the floor."""
+        return self.not_logged | self.touching
+
+    @property
+    def not_logged(self) -> np.ndarray:
+        """Samples that straight lines stand for, bool (n,): the row was lost, or it lacks what is measured."""
+        return self.lost | self.unmeasured
 
     @property
     def on_ground(self) -> np.ndarray:
@@ -77,10 +91,11 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     """
     name = log.source
     log, notes = without_bad_columns(log)
+    notes += tuple(f"{Path(name).name}: {w}" for w in flies_below_in_words(log, vehicle.arm_pwm))
     log, clock, lost = with_lost_rows(at_100_hz(log, name), name)
     if stamped_at_arrival(log):
         clock = np.zeros_like(clock)
-    cannot, phase = cannot_tell(log), _phases(log)
+    cannot, phase = cannot_tell(log), _phases(log, vehicle.arm_pwm)
     ground = phase == GROUND
     _check_long_enough(~ground, name, "in the air")
     angles = attitude(log)
@@ -90,11 +105,24 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     rates = interpolate_missing(log.stack(GYRO)) if log.has(*GYRO) else None
     pwm = interpolate_missing(log.stack(PWM))
     running = pwm.max(axis=1) > 0.0
-    usable = ~lost & ~near_ground(ground, running) & ~knocks(force, ground & ~running) & ~jolts(force, rates, ~ground)
+    unmeasured = _long_holes(log) & ~lost
+    if (unmeasured & ~ground).any():
+        notes = (*notes, HOLE_NOTE.format((unmeasured & ~ground).sum() * PERIOD_S, LONGEST_BRIDGE_S))
+    touched = near_ground(ground, running) | knocks(force, ground & ~running) | jolts(force, rates, ~ground)
+    usable = ~lost & ~unmeasured & ~touched
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
-                  body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost, touching=touching,
-                  notes=notes, cannot=cannot)
+                  body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost,
+                  unmeasured=unmeasured, touching=touching, notes=notes, cannot=cannot)
+
+
+def _long_holes(log: FlightLog) -> np.ndarray:
+    """Samples (n,), bool, in a hole of more than LONGEST_BRIDGE_S of a column of the IMU or of the motor commands."""
+    missing = np.isnan(log.stack([c for c in (*ACC, *GYRO, *PWM) if log.has(c)])).T
+    out = np.zeros(len(log), bool)
+    for start, stop in (hole for column in missing for hole in runs(column)):
+        out[start:stop] |= stop - start > MOST_BRIDGED
+    return out
 
 
 def _check_long_enough(samples: np.ndarray, name: str, which: str) -> None:
@@ -133,6 +161,12 @@ def with_gyro_if_any(flights: Sequence[Flight], reasons: list[str]) -> list[Flig
     return with_gyro
 
 
+def notes_on(flights: Sequence[Flight], nominal: Sequence[Flight]) -> list[str]:
+    """The notes on flights and on those of the baseline."""
+    return [*notes_of([(f.name, f.notes) for f in flights]),
+            *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
+
+
 def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -> Flight:
     """The flight as it would be made ready from a log without some columns, which are neither commands nor motion."""
     log = FlightLog({k: v for k, v in flight.log.columns.items() if k not in columns}, flight.log.meta)
@@ -149,10 +183,10 @@ def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np
     return interpolate_missing(log.stack(ACC))
 
 
-def _phases(log: FlightLog) -> np.ndarray:
+def _phases(log: FlightLog, arm_pwm: float) -> np.ndarray:
     """Phase of each sample, int8 (n,): places in `segments.KINDS`."""
     phase = np.zeros(len(log), np.int8)
-    for part in segments(log):
+    for part in segments(log, arm_pwm):
         phase[part.start:part.stop] = KINDS.index(part.kind)
     return phase
 

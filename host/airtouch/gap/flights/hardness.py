@@ -85,14 +85,14 @@ def slopes_of(power: np.ndarray, hardness: np.ndarray, frequency: np.ndarray,
 def _slope(y: np.ndarray, x: np.ndarray) -> float:
     """Slope of log mean against x of gamma distributed y (n,), of highest posterior under PRIOR."""
     table = np.stack([np.ones(len(x)), x - x.mean()], axis=1)
-    middle, spread = PRIOR
+    mean, spread = PRIOR
     start = np.array([np.log(y.mean()), 0.0])
     line = start.copy()  # level and slope
     for _ in range(NEWTON_STEPS):
         ratio = y / np.exp(table @ line)
         dispersion = max(float(((ratio - 1.0) ** 2).sum()) / (len(y) - 2), LEAST_DISPERSION)
         information = table.T @ table / dispersion + np.diag([0.0, 1.0 / spread ** 2])
-        push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (line[1] - middle) / spread ** 2])
+        push = table.T @ (ratio - 1.0) / dispersion - np.array([0.0, (line[1] - mean) / spread ** 2])
         step = np.linalg.solve(information, push)
         line = line + np.clip(step, -LARGEST_STEP, LARGEST_STEP)
     return float(np.clip(line[1], 0.0, STEEPEST))

@@ -41,7 +41,8 @@ def _over_steps(log: FlightLog, body_to_world: np.ndarray, row: np.void, rise: n
     The edge passes under a rotor earlier or later than under the sensor, by the rotor's distance along the path over
     the speed: there the floor is that under the sensor so many samples before or after.
     """
-    height = interpolate_missing(log["zrange_m"]) + row["range_below_rotors"]
+    plumb = np.maximum(body_to_world[:, 2, 2], 0.0)  # cosine between plumb and the beam, which is along the body's axis
+    height = (interpolate_missing(log["zrange_m"]) + row["range_below_rotors"]) * plumb
     altitude = _altitude(log, height)
     index, floor = np.arange(len(log), dtype=np.float64), altitude - height
     ahead = _samples_ahead(log, body_to_world, row)
@@ -74,6 +75,11 @@ def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:
     """Height over the floor (n,): the logged one, else the down range without its steps."""
     if log.has(POSITION[2]):
         return interpolate_missing(log[POSITION[2]])
+    return height[0] + climbed(height, STEP_M)
+
+
+def climbed(height: np.ndarray, step_m: float) -> np.ndarray:
+    """Height (n,), m, gained since the first sample by a down range without its steps, changes of more than step_m."""
     change = np.diff(height, prepend=height[0])
-    change[np.abs(change) > STEP_M] = 0.0
-    return height[0] + np.cumsum(change)
+    change[np.abs(change) > step_m] = 0.0
+    return np.cumsum(change)

@@ -26,17 +26,18 @@ def bridging_power(flight: Flight, vehicle: Vehicle, calibration: Sequence[Activ
                    quiet: np.ndarray | None = None, response: Response | None = None) -> np.ndarray:
     """Power (blocks, bins, COUNT), unit^2/Hz, that lost rows add to the blocks in the air that begin at `first`.
 
-    It is zero where no row was lost, and for blocks whose pattern has no room elsewhere in the flight. quiet
-    (blocks, 3), response: as `Response.with_torque_gap` takes them; without, the torque is that of the logged commands.
+    It is zero where no row was lost or unmeasured, and for blocks whose pattern has no room elsewhere in the flight.
+    quiet (blocks, 3), response: as `Response.with_torque_gap` takes them; without, the torque is that of the logged
+    commands.
     """
     total, count = np.zeros((len(first), LENGTH[AIR] // 2 + 1, COUNT)), np.zeros(len(first))  # of the shifts with room
-    if not flight.lost.any() or not len(first):
+    if not flight.not_logged.any() or not len(first):
         return total
     gap = bridged_residual(ReplayedFlight(flight, vehicle), calibration)
     turning = angular_acceleration(flight)
     for k in range(1, SHIFTS + 1):
         offset = k * len(flight) // (SHIFTS + 1)
-        poorer = _without(flight, np.roll(flight.lost, offset))
+        poorer = _without(flight, np.roll(flight.not_logged, offset))
         change = np.nan_to_num(bridged_residual(ReplayedFlight(poorer, vehicle), calibration) - gap)
         begin = (first + offset) % len(flight)
         room = _in_flight(flight, begin)

@@ -66,10 +66,11 @@ def same_things(names: Sequence[str], others: Sequence[str]) -> bool:
     return not unmatched
 
 
-def confusion_among(names: Sequence[str]) -> Confusion:
-    """What tells effects from one another, or first those of them that are names of one thing, as the first is."""
-    first = names_alike(names[0])
-    if first is not None and first.effects <= frozenset(names):
-        return first
-    known = next((c for c in CONFUSED if c.effects <= frozenset(names)), None)
-    return Confusion(frozenset(names), *(known[1:] if known else (REMEDY, MISSION)))
+def confusions_among(names: Sequence[str]) -> list[Confusion]:
+    """What tells effects from one another: each pair that is known, then all of them where one is in no known pair."""
+    group, known = frozenset(names), {}
+    for confusion in (*ALIKE, *CONFUSED):
+        if confusion.effects <= group:
+            known.setdefault(confusion.effects, confusion)
+    in_pairs = frozenset().union(*known)
+    return [*known.values(), *([] if group <= in_pairs else [Confusion(group, REMEDY, MISSION)])]

@@ -101,7 +101,10 @@ def is_random(name: str) -> bool:
 
 
 def term_of(effect: NamedEffect) -> Term:
-    """The term of an effect that a diagnosis named, with its values: its own variant, or the nearest."""
+    """The term of an effect that a diagnosis named, with its values: its own variant, or the nearest.
+
+    Of an effect whose parameters are also tried alone (`Signature.alone_too`), the term in which all of them are free.
+    """
     values = {k: q.value for k, q in effect.parameters.items()}
 
     def distance(term: Term) -> float:

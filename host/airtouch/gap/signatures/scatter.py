@@ -134,8 +134,8 @@ class Scatter:
         least: what would be news in a flight of rate 0, nats. To it comes the rate that a share FALSE_SHARE of nominal
         flights exceeds, if fourth roots of rates scatter as Student's.
         """
-        middle, spread = self.rate
-        return least + seconds * (middle + float(stdtrit(self.freedom, 1.0 - FALSE_SHARE)) * spread) ** 4
+        mean, spread = self.rate
+        return least + seconds * (mean + float(stdtrit(self.freedom, 1.0 - FALSE_SHARE)) * spread) ** 4
 
     def unusual(self, sizes: Mapping[str, float]) -> float:
         """Nats by which the rarity of sizes is over its limit, negative below (`rarity`)."""
@@ -150,8 +150,8 @@ class Scatter:
         """
         nats = 0.0
         for name, size in sizes.items():
-            middle, spread = self.passing.get(name, (0.0, 0.0))
-            nats += _rarity(max(size - middle, 0.0) / max(spread, LEAST_SPREAD), self.freedom)
+            mean, spread = self.passing.get(name, (0.0, 0.0))
+            nats += _rarity(max(size - mean, 0.0) / max(spread, LEAST_SPREAD), self.freedom)
         return float(nats), _exceeded(len(sizes), self.freedom)
 
 

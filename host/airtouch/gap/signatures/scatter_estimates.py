@@ -47,11 +47,11 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
         own, simulated = classes[best], best == SIMULATED  # whose flights are all drawn alike
     worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
     update = Update(own, known, worth)
-    middle = _updated_middle(update)
-    rms = _updated_rms(update, middle, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
+    means = _updated_means(update)
+    rms = _updated_rms(update, means, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
     passing = {n: updated(r, [f.passing.get(n, 0.0) for f in known], worth, r[1]) for n, r in own.passing.items()}
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
-    return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=middle, exact=simulated)
+    return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
 
 
 def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[ApparentStrengths] | None = None) -> Scatter:
@@ -61,14 +61,14 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
     day and condition; all by default.
     """
     alike = flights if alike is None else alike
-    rms, middle = {}, {}
+    rms, means = {}, {}
     for name in sorted({n for f in flights for n in f.strengths}):
         rows = [f for f in flights if name in f.strengths]
         size = max(len(f.strengths[name]) for f in rows)
         columns = [(_column(rows, name, "strengths", k), _column(rows, name, "errors", k)) for k in range(size)]
         if is_random(name):
-            middle[name] = np.array([strengths.mean() for strengths, _ in columns])
-            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, middle[name], strict=True)]
+            means[name] = np.array([strengths.mean() for strengths, _ in columns])
+            columns = [(strengths - m, errors) for (strengths, errors), m in zip(columns, means[name], strict=True)]
         together, errors = (np.concatenate(part) for part in zip(*columns, strict=True))
         pooled = standard_deviation(together, errors, 0.0)
         rms[name] = np.array([standard_deviation(x, e, pooled, (POOLED,)) for x, e in columns] if size > 1
@@ -77,7 +77,7 @@ def class_scatter(flights: Sequence[ApparentStrengths], alike: Sequence[Apparent
     names = sorted({n for f in alike for n in f.passing})
     passing = {n: mean_and_deviation([f.passing.get(n, 0.0) for f in alike]) for n in names}
     rate = mean_and_deviation(fourth_root([f.rate for f in alike]))
-    return Scatter(rms, float(len(alike)), rate, passing, middle=middle)
+    return Scatter(rms, float(len(alike)), rate, passing, middle=means)
 
 
 def _possible_classes(recorded: bool, vehicle: str, one_trim: bool | None) -> dict[str, Scatter]:
@@ -96,20 +96,20 @@ class Update(NamedTuple):
     worth: float
 
 
-def _updated_middle(update: Update) -> dict[str, np.ndarray]:
+def _updated_means(update: Update) -> dict[str, np.ndarray]:
     """Mean strength (k,) of each random effect, of the class and of the baseline."""
-    middle, (own, known, worth) = {}, update
+    means, (own, known, worth) = {}, update
     for name in own.rms:
         if name in own.middle:
             rows = [f for f in known if name in f.strengths]
             sums = sum((f.strengths[name] for f in rows), worth * own.middle[name])
-            middle[name] = sums / (worth + len(rows))
-    return middle
+            means[name] = sums / (worth + len(rows))
+    return means
 
 
-def _updated_rms(update: Update, middle: Mapping[str, np.ndarray], widening: float, least: float,
+def _updated_rms(update: Update, means: Mapping[str, np.ndarray], widening: float, least: float,
                  ) -> dict[str, np.ndarray]:
-    """Scatter (k,) of each effect's strength about its middle, by the baseline's flights, at least `least`.
+    """Scatter (k,) of each effect's strength about its mean, by the baseline's flights, at least `least`.
 
     widening: factor of the baseline's scatter. The log's times are known exactly and differ from day to day: their
     scatter is not less than the class's.
@@ -117,7 +117,7 @@ def _updated_rms(update: Update, middle: Mapping[str, np.ndarray], widening: flo
     rms, (own, known, worth) = {}, update
     for name, prior in own.rms.items():
         rows = [f for f in known if name in f.strengths]
-        centre = middle.get(name, np.zeros(len(prior)))
+        centre = means.get(name, np.zeros(len(prior)))
         own_rms = [standard_deviation(widening * (_column(rows, name, "strengths", k) - centre[k]),
                                       widening * _column(rows, name, "errors", k), p,
                                       (worth, min(worth, RECORDED_WORTH)))
@@ -153,18 +153,18 @@ def _log_likelihood(own: Scatter, baseline: Sequence[ApparentStrengths], wide: f
                 strength = flight.strengths[name][:n] - own.middle.get(name, np.zeros(n))[:n]
                 far = wide * strength ** 2 / variance
                 total -= float(np.sum(0.5 * np.log(variance) + 0.5 * (nu + 1.0) * np.log1p(far / nu)))
-        middle, spread = own.rate
+        mean, spread = own.rate
         spread = max(spread, LEAST_RATE_SPREAD)
-        total += float(student_log_density(fourth_root(flight.rate), RATE_FREEDOM, middle, spread))
-        for name, (middle, spread) in own.passing.items():
+        total += float(student_log_density(fourth_root(flight.rate), RATE_FREEDOM, mean, spread))
+        for name, (mean, spread) in own.passing.items():
             size = flight.passing.get(name, 0.0)
-            total += float(student_log_density(size, RATE_FREEDOM, middle, max(spread, LEAST_SPREAD)))
+            total += float(student_log_density(size, RATE_FREEDOM, mean, max(spread, LEAST_SPREAD)))
     return total
 
 
-def student_log_density(x: float, freedom: float, middle: float, spread: float) -> float:
-    """Logarithm of Student's density about a middle, of a spread; scipy.stats takes a second to import."""
-    far = (x - middle) / spread
+def student_log_density(x: float, freedom: float, mean: float, spread: float) -> float:
+    """Logarithm of Student's density about a mean, of a spread; scipy.stats takes a second to import."""
+    far = (x - mean) / spread
     top = np.log(poch(0.5 * freedom, 0.5)) - 0.5 * (np.log(freedom) + np.log(np.pi))
     return top - 0.5 * (freedom + 1.0) * np.log1p(far * far / freedom) - np.log(spread)
 

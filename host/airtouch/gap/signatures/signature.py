@@ -168,6 +168,9 @@ SIGNATURES: dict[str, Signature] = {
     "controller_gain": Signature(
         ("rate", "attitude", "position", "height"), alone_too=True, commands_only=True, factors=True),
 }
+#: effects of the package without a record: they change readings that only the estimator sees, so that a replay of the
+#: logged signals does not show them; the relations of signals do, where a library of these holds
+RELATIONS_ONLY = ("range_bias", "flow_latency")
 #: passing effects, which may act for some seconds of a flight only
 PASSING = tuple(name for name, s in SIGNATURES.items() if s.may_pass)
 #: effects that are only tried with their random part

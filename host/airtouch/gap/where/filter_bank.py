@@ -12,7 +12,8 @@ from airtouch.gap.signals.spectra import difference_power
 from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
-#: edges of the map's bands, Hz: about octaves, chosen; the last ends at half the 100 Hz of the flights
+#: edges of the map's bands, Hz: about octaves, chosen; the last ends at half the 100 Hz of the flights. Spectra are
+#: judged in `flights.blocks.BANDS_HZ`, which says why its lowest edge is another
 MAP_BANDS_HZ = ((0.0, 0.5), (0.5, 2.0), (2.0, 6.0), (6.0, 12.0), (12.0, 25.0), (25.0, 50.0))
 CROSSOVER = 0.3  #: half the width of a crossover between two bands, as a fraction of its frequency; chosen
 NOISE_FREQUENCIES = 2000  #: at which the gain of a band is averaged for the sensors' noise; chosen

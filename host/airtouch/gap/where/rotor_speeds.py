@@ -12,7 +12,7 @@ from airtouch.logs.flight_log import RPM
 from airtouch.simulation import replay
 
 LEAST_RPM = 500.0  #: 1/min from which a rotor is logged to turn; chosen, far below any hover
-MOST_TURNING = 0.5  #: share of the samples in the air above which it must be; chosen
+LEAST_TURNING = 0.5  #: share of the samples in the air above which it must be; chosen
 LEAST_MODELLED_RPM = 1.0  #: 1/min by which a logged speed is divided at least; chosen
 
 
@@ -44,7 +44,7 @@ def rotor_speeds(flight: Flight, study: Study) -> np.ndarray | None:
     model = replay.run(flight.log, study.vehicle, study.calibration, signals=flight.signals.copy(),
                        pwm=flight.pwm)
     logged = np.array([interpolate_missing(flight.log[c]) for c in RPM]).T[air]
-    turning = (logged > LEAST_RPM).mean(axis=0) > MOST_TURNING  # a counter that is stuck says nothing
+    turning = (logged > LEAST_RPM).mean(axis=0) > LEAST_TURNING  # else no counter, or it reads nothing
     return np.array([np.where(turning, np.median(logged, axis=0), np.nan),
                      np.median(model.rotor_speed[air], axis=0) * 30.0 / np.pi])
 

@@ -10,7 +10,7 @@ from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, s
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
-from airtouch.logs.in_flight import airborne
+from airtouch.logs.in_flight import airborne, flies_below_in_words
 from airtouch.logs.segments import Segment, segments
 
 #: group of channels -> a column of that group
@@ -131,6 +131,7 @@ def _faults_in_words(log: FlightLog, quality: Quality) -> list[str]:
         words.append(f"{name}: {count} samples at the end of its scale")
     for name, at in quality.spikes.items():
         words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
+    words += flies_below_in_words(log)
     in_air = sum(phase.stop - phase.start for phase in quality.segments if phase.kind != "ground") * sample_period(log)
     if not in_air:
         words.append("no flight in it, or no motors and height to tell")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.table import Sheet, named_table
-from airtouch.logs.variables import to_columns
+from airtouch.logs.variables import ASSUMED, to_columns
 
 
 def matches(names: list[str]) -> bool:
@@ -15,11 +15,11 @@ def matches(names: list[str]) -> bool:
 
 def read(text: Sheet, source: str) -> FlightLog:
     """The FlightLog of a CrazyPAD CSV. `m*_pwm` are after battery compensation, as sent to the motors."""
-    meta = {"source": source, "format": "crazypad", "vehicle": "crazyflie-2.1", "condition": "",
-            "warnings": []}
+    meta = {"source": source, "format": "crazypad", **ASSUMED, "condition": "", "warnings": []}
     match = re.match(r"pad_(.*)_(E\d+)_log\d+", Path(source).name)
     if match:
         meta["condition"], meta["drone"] = match.groups()
+        del meta["assumed_vehicle"]  # both drones of CrazyPAD
     return read_variables(text, source, meta)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.crazypad import read_variables
 from airtouch.logs.table import Sheet
+from airtouch.logs.variables import ASSUMED
 
 
 def matches(names: list[str]) -> bool:
@@ -15,9 +16,9 @@ def matches(names: list[str]) -> bool:
 
 def read(text: Sheet, source: str) -> FlightLog:
     """The FlightLog of an IMRCLab flight. Pose and velocity are the on-board estimate."""
-    meta = {"source": source, "format": "crazyflie-csv", "vehicle": "crazyflie-2.1", "condition": "",
-            "warnings": []}
+    meta = {"source": source, "format": "crazyflie-csv", **ASSUMED, "condition": "", "warnings": []}
     match = re.match(r"brushed_(\w+)\.csv", Path(source).name)
     if match:
         meta |= {"condition": match.group(1), "format": "imrclab"}
+        del meta["assumed_vehicle"]  # their brushed drone
     return read_variables(text, source, meta)

@@ -64,11 +64,13 @@ def read(path: str | Path) -> FlightLog:
     table = {name: np.array(rows[name][topic]).T for name, topic in chosen.items()}
     clock = RECORDED if _two_clocks(table) else STAMPED
     signals = {name: (values[clock], values[2]) for name, values in table.items()}
+    warnings = _ignored(rows, chosen)
     if PWM[0] in signals:
-        pwm = _pwm(np.array([signals[name][1] for name in PWM]), kinds[chosen[PWM[0]]])
+        pwm, unit = _pwm(np.array([signals[name][1] for name in PWM]), kinds[chosen[PWM[0]]])
+        warnings.append(f"{printable(chosen[PWM[0]])}: motor commands taken as {unit}, by their range")
         signals |= {name: (signals[name][0], values) for name, values in zip(PWM, pwm, strict=True)}
     return aligned_log(signals, {"source": str(path), "format": "rosbag2", "vehicle": "", "acc_frame": "body",
-                                 "warnings": _ignored(rows, chosen)})
+                                 "warnings": warnings})
 
 
 def _rank(topic: str, kinds: dict[str, str], frames: dict[str, str]) -> tuple[int, bool, int]:
@@ -145,15 +147,15 @@ def _motors(message: Any) -> list[tuple[str, float]]:
     return list(zip(PWM, values.tolist(), strict=True)) if len(values) == 4 else []
 
 
-def _pwm(commands: np.ndarray, kind: str) -> np.ndarray:
-    """PWM (4, n) of a topic's motor commands (4, n): 0 to 1 in floating point, pulses of 1000 to 2000 us, or PWM."""
+def _pwm(commands: np.ndarray, kind: str) -> tuple[np.ndarray, str]:
+    """PWM (4, n) of a topic's motor commands (4, n), and their unit in words, by their type and range."""
     there = commands[np.isfinite(commands) & (commands != 0.0)]
     most = there.max(initial=0.0)
     if kind.startswith("Float") and most <= MOST_SHARE:
-        return 65535.0 * np.clip(commands, 0.0, 1.0)
+        return 65535.0 * np.clip(commands, 0.0, 1.0), "0 to 1"
     if len(there) and there.min() >= PULSE_US[0] and most <= PULSE_US[1]:
-        return 65535.0 * np.clip((commands - 1000.0) / 1000.0, 0.0, 1.0)
-    return commands
+        return 65535.0 * np.clip((commands - 1000.0) / 1000.0, 0.0, 1.0), "pulses of 1000 to 2000 us"
+    return commands, "PWM of 0 to 65535"
 
 
 #: message type -> reader of its columns; of two types with the same column the one that comes first is read

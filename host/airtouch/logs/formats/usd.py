@@ -18,7 +18,7 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.table import MOST_COLUMNS
-from airtouch.logs.variables import to_columns
+from airtouch.logs.variables import ASSUMED, to_columns
 
 MAGIC = 0xBC
 MAIN_EVENT = "fixedFrequency"
@@ -57,8 +57,7 @@ def read(data: bytes, source: str) -> FlightLog:
     size = event.dtype.itemsize
     records = np.frombuffer(b"".join(data[o:o + size] for o in places), dtype=event.dtype)
     table = {name: records[f"v{i}"].astype(np.float64) for i, name in enumerate(event.variables)}
-    meta = {"source": source, "format": f"usd-{version}", "vehicle": "crazyflie-2.1", "condition": "",
-            "warnings": warnings}
+    meta = {"source": source, "format": f"usd-{version}", **ASSUMED, "condition": "", "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
         names = ", ".join(printable(name) for name in event.variables[:6])

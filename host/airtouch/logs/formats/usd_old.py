@@ -15,10 +15,13 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.formats.usd import TYPES
-from airtouch.logs.variables import to_columns
+from airtouch.logs.variables import ASSUMED, to_columns
 
 TIME = "tick"  #: the variable with the time
-LONGEST_STEP_MS = 500  #: ticks; the deck logs at 1 to 1000 Hz, so with a larger median step ticks are microseconds
+#: ticks of a median step, beyond which they are microseconds. The deck logs at 1 to 1000 Hz: a step has 1 to 1000 ms,
+#: or 1000 to 1,000,000 us. So 500 to 1000 are ms at 1 to 2 Hz by the rates alone; no flight is logged so slowly.
+LONGEST_STEP_MS = 500
+LONGEST_IN_DOUBT = 1100  #: ticks of a median step up to which it may have been ms; 1000 and the jitter of a slow log
 _VARIABLE = re.compile(rb"([\w.]{1,60})\(([" + "".join(TYPES).encode() + rb"])\),")
 
 
@@ -47,17 +50,21 @@ def read(data: bytes, source: str) -> FlightLog:
     table = {name: rows[f"v{i}"].astype(np.float64) for i, name in enumerate(names)}
     if TIME not in table:
         raise AirTouchError(f"{source}: an old uSD log without the variable 'tick' has no time; log it too")
-    meta = {"source": source, "format": "usd-0", "vehicle": "crazyflie-2.1", "condition": "", "warnings": warnings}
+    meta = {"source": source, "format": "usd-0", **ASSUMED, "condition": "", "warnings": warnings}
     columns = to_columns(table, meta)
     if not columns:
         known = ", ".join(printable(name) for name in names[:6])
         raise AirTouchError(f"{source}: none of its variables is known ({known}); log acc, gyro, motor and range")
-    return FlightLog({"t_s": table[TIME] * _seconds(table[TIME])} | columns, meta)
+    return FlightLog({"t_s": table[TIME] * _seconds(table[TIME], warnings)} | columns, meta)
 
 
-def _seconds(ticks: np.ndarray) -> float:
-    """Seconds per tick."""
-    return 1e-6 if len(ticks) > 1 and np.median(np.diff(ticks)) > LONGEST_STEP_MS else 1e-3
+def _seconds(ticks: np.ndarray, warnings: list[str]) -> float:
+    """Seconds per tick. Adds a warning where they may be milliseconds or microseconds."""
+    step = float(np.median(np.diff(ticks))) if len(ticks) > 1 else 0.0
+    if LONGEST_STEP_MS < step <= LONGEST_IN_DOUBT:
+        warnings.append(f"{TIME} rises by {step:g}: taken as microseconds ({1e6 / step:.0f} Hz); if the deck logged at "
+                        f"{1e3 / step:.1f} Hz they are milliseconds and t_s is 1000 times too small")
+    return 1e-6 if step > LONGEST_STEP_MS else 1e-3
 
 
 def _variables(data: bytes) -> tuple[list[str], list[str], int] | None:

@@ -6,9 +6,9 @@ from airtouch.simulation import signals as at
 from airtouch.simulation.body.rotation import rotate_back
 from airtouch.simulation.compiled import jit
 
-SINK_M = 0.002  #: the legs give this much under the vehicle's weight
-DAMPING = 0.5  #: of the bounce, critical is 1
-FRICTION_S = 0.02  #: sliding dies out with this time constant, under full weight
+SINK_M = 0.002  #: m that the legs give under the vehicle's weight; chosen: it bounces at 11 Hz, 45 steps a period
+DAMPING = 0.5  #: of the bounce, critical is 1; chosen: each swing is a sixth of the one before
+FRICTION_S = 0.02  #: s, time constant with which sliding dies out under full weight; chosen, not measured
 
 
 @jit

@@ -12,6 +12,7 @@ from airtouch.simulation.sensors import filters
 
 _F = np.float64
 DELAY_ROWS = 64  #: of the delay line, a power of two: delays of up to 63 physics steps
+LEAST_FACTOR = 0.2  #: voltage factor below which compensation asks for no more PWM; chosen, so that it stays finite
 TURN = 2.0 * math.pi  #: rad
 STATE = np.dtype([
     ("pwm", _F, (4,)),  # commands, 0..65535
@@ -65,7 +66,7 @@ def compensated(plant, pwm, factor):
     if pwm <= 0.0:
         return 0.0
     c = plant.thrust_curve
-    thrust = (c[0] + c[1] * pwm + c[2] * pwm * pwm) / max(factor, 0.2)
+    thrust = (c[0] + c[1] * pwm + c[2] * pwm * pwm) / max(factor, LEAST_FACTOR)
     if c[2] == 0.0:
         return (thrust - c[0]) / c[1]
     return (-c[1] + math.sqrt(max(c[1] * c[1] - 4.0 * c[2] * (c[0] - thrust), 0.0))) / (2.0 * c[2])

@@ -24,13 +24,15 @@ LOOPS = ("rate_roll", "rate_pitch", "rate_yaw", "roll", "pitch", "yaw", "velocit
 (RATE_ROLL, RATE_PITCH, RATE_YAW, ROLL, PITCH, YAW, VELOCITY_X, VELOCITY_Y, VELOCITY_Z, POSITION_X,
  POSITION_Y, POSITION_Z) = range(12)
 RANGE_MODULES = ("none", "platform", "map")
+FLAGS = (0, 1)  #: values of what is on or off
+MOST_BASES = 20  #: firmware files that name one another; more is a circle or a mistake
 OWN_MODULE = "firmware"  #: of a vehicle or scenario: the range module that its firmware has
 COMPENSATIONS = ("none", "quadratic", "cubic", "vehicle")
 (NO_MODULE, PLATFORM, MAP), (NO_COMPENSATION, QUADRATIC, CUBIC, OF_VEHICLE) = range(3), range(4)
 
 _F, _I = np.float64, np.int64
 GAINS = np.dtype([("p", _F), ("i", _F), ("d", _F), ("integral_limit", _F), ("output_limit", _F)])
-#: section -> key -> (type, choices or None, meaning)
+#: section -> key -> (type, names or FLAGS to choose from, or (number of values,), or None; meaning)
 KEYS: dict[str, dict[str, tuple[Any, tuple[Any, ...] | None, str]]] = {
     "periods": {
         "attitude_ms": (_I, None, "of the attitude and rate loops; a multiple of 2"),
@@ -39,9 +41,9 @@ KEYS: dict[str, dict[str, tuple[Any, tuple[Any, ...] | None, str]]] = {
         "range_ms": (_I, None, "of the down range's readings"),
         "flow_ms": (_I, None, "of the optical flow's readings")},
     "controller": {
-        "derivative_on_error": (_I, None, "1: derivatives act on the error, 0: on the measurement"),
-        "reset_on_mode_change": (_I, None, "1: a set-point of another mode resets all loops"),
-        "reset_in_rate_mode": (_I, None, "1: roll and pitch in rate mode reset their angle loops"),
+        "derivative_on_error": (_I, FLAGS, "1: derivatives act on the error, 0: on the measurement"),
+        "reset_on_mode_change": (_I, FLAGS, "1: a set-point of another mode resets all loops"),
+        "reset_in_rate_mode": (_I, FLAGS, "1: roll and pitch in rate mode reset their angle loops"),
         "thrust_base": (_F, None, "command in hover, of 65535"),
         "thrust_min": (_F, None, "least command in flight, of 65535"),
         "thrust_scale": (_F, None, "command per unit of the climb loop's output"),
@@ -94,7 +96,7 @@ KEYS: dict[str, dict[str, tuple[Any, tuple[Any, ...] | None, str]]] = {
 
 
 def _field(kind: Any, choices: Any) -> tuple:
-    return (kind, choices) if choices and isinstance(choices[0], int) else (kind,)
+    return (kind, choices) if choices and len(choices) == 1 else (kind,)
 
 
 DTYPE = np.dtype([("loops", GAINS, (len(LOOPS),))] + [
@@ -111,16 +113,17 @@ def names() -> list[str]:
 _names = functools.cache(names)
 
 
-def load(name_or_path: str | Path = DEFAULT) -> np.ndarray:
+def load(name_or_path: str | Path = DEFAULT, depth: int = 0) -> np.ndarray:
     """The settings (1,) of DTYPE of a firmware by name, or of a TOML file by path.
 
-    Raises AirTouchError that names the nearest known firmware, or the wrong key.
+    depth: number of files that name this one as their base. Raises AirTouchError that names the nearest known
+    firmware, or the wrong key.
     """
     name = str(name_or_path)
     if name.endswith(".toml"):
         if not Path(name).is_file():
             raise AirTouchError(f"{name}: no such firmware file")
-        return parse(Path(name).read_text(encoding="utf-8", errors="replace"), name)
+        return parse(Path(name).read_text(encoding="utf-8", errors="replace"), name, depth)
     if name not in _names():
         near = difflib.get_close_matches(name, _names(), 3, 0.3)
         hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names())}"
@@ -134,14 +137,21 @@ def _built_in(name: str) -> np.ndarray:
     return parse(text, name)
 
 
-def parse(text: str, source: str) -> np.ndarray:
-    """Settings (1,) from TOML text; `source` names it in messages."""
+def parse(text: str, source: str, depth: int = 0) -> np.ndarray:
+    """Settings (1,) from TOML text; `source`, its path or name, names it in messages. depth: as of `load`.
+
+    A base that ends in .toml is a file beside `source`, unless its path is absolute.
+    """
     table = tables.parse(text, source)
     base = table.pop("base", None)
     table.pop("summary", None)
     if base is not None and not (isinstance(base, str) and base != source):
         raise AirTouchError(f"{source}: base must name another firmware")
-    rows = load(base) if base else np.zeros(1, DTYPE)
+    if depth > MOST_BASES:
+        raise AirTouchError(f"{source}: more than {MOST_BASES} firmware files name one another as their base")
+    if base and base.endswith(".toml"):
+        base = str(Path(source).parent / base)
+    rows = load(base, depth + 1) if base else np.zeros(1, DTYPE)
     unknown = sorted(set(table) - set(KEYS) - {"loops"})
     if unknown:
         raise AirTouchError(f"{source}: unknown section {', '.join(unknown)}; known: loops, {', '.join(KEYS)}")
@@ -178,10 +188,10 @@ def _loop(loops: np.ndarray, key: str, value: Any, source: str) -> None:
 def _value(row: Any, section: str, key: str, value: Any, source: str) -> None:
     if key not in KEYS[section]:
         raise AirTouchError(f"{source}: [{section}] has no {key}; it has {', '.join(KEYS[section])}")
-    _, choices, _ = KEYS[section][key]
-    if choices and isinstance(choices[0], str):
+    kind, choices, _ = KEYS[section][key]
+    if choices and len(choices) > 1:
         if value not in choices:
-            raise AirTouchError(f"{source}: {section}.{key} is one of {', '.join(choices)}, not {value!r}")
+            raise AirTouchError(f"{source}: {section}.{key} is one of {', '.join(map(str, choices))}, not {value!r}")
         row[key] = choices.index(value)
     elif choices:
         if not (isinstance(value, list) and len(value) == choices[0] and all(map(_is_number, value))):
@@ -189,6 +199,8 @@ def _value(row: Any, section: str, key: str, value: Any, source: str) -> None:
         row[key] = value
     elif not _is_number(value):
         raise AirTouchError(f"{source}: {section}.{key} must be a number")
+    elif kind is _I and not (value == int(value) and abs(value) < 2**31):
+        raise AirTouchError(f"{source}: {section}.{key} = {value:g} must be a whole number, less than 2^31")
     else:
         row[key] = value
 
@@ -205,7 +217,9 @@ def _check(row: Any, source: str) -> None:
                          ("controller", "thrust_scale"), ("filters", "acc_hz"), ("filters", "gyro_hz")):
         if not row[section][key] > 0:
             raise AirTouchError(f"{source}: {section}.{key} must be positive")
+    if not 0.0 < row["battery_compensation"]["voltage_share"] <= 1.0:
+        raise AirTouchError(f"{source}: battery_compensation.voltage_share must be more than 0 and at most 1")
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, bool)) and bool(np.isfinite(value))
+    return isinstance(value, bool) or tables.is_number(value)

@@ -59,8 +59,9 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
     """Set-points (rows, 8) of a mission whose values are drawn.
 
     mission: start_m, yaw_deg, control ("velocity" as the paper's flights, or "position"),
-    step: a list of tables with `do`. Raises AirTouchError for unknown or missing keys, for
-    a path through a surface and for speeds beyond the firmware's limit.
+    step: a list of tables with `do`. Raises AirTouchError for unknown, missing or contradicting keys, for a mission
+    without take-off, for a path of the set-points through a surface (the vehicle's size is left out, and so are
+    take-off and landing) and for speeds, climb and pulses among them, beyond the firmware's limit.
     """
     unknown = set(mission) - {"start_m", "yaw_deg", "control", "step"}
     if unknown:
@@ -84,16 +85,33 @@ def setpoints(mission: Mapping[str, Any], world: World, where: str) -> np.ndarra
             fault, keys = ("does not take", wrong) if wrong else ("needs", missing)
             raise AirTouchError(f"{place}: {kind} {fault} {', '.join(sorted(keys))}")
         _check_numbers(step, place)
-        if step.get("speed_mps", 0.0) > MAX_SPEED_MPS:
-            raise AirTouchError(f"{place}: {step['speed_mps']:g} m/s is faster than the firmware flies, "
-                                f"{MAX_SPEED_MPS:g} m/s")
+        for key in ("speed_mps", "pulse_mps"):
+            _check_speed(abs(step.get(key, 0.0)), place)
         first = pen.count
         _run(pen, kind, step, place)
         if pen.count > MAX_FLIGHT_S * RATE_HZ:
             raise AirTouchError(f"{place}: the flight is longer than {MAX_FLIGHT_S:g} s")
         if kind in ("hover", "go", "zigzag"):
             _check_path(pen, first, place)
+    if not any(step["do"] == "take-off" for step in steps):
+        raise AirTouchError(f"{where}: this mission never takes off")
     return np.ascontiguousarray(np.concatenate(pen.rows))
+
+
+def _check_speed(mps: float, place: str, remedy: str = "") -> None:
+    """Raise AirTouchError, with what to do, for a speed beyond the firmware's limit."""
+    if mps > MAX_SPEED_MPS * (1.0 + 1e-9):  # but for rounding
+        raise AirTouchError(f"{place}: {mps:g} m/s is faster than the firmware flies, {MAX_SPEED_MPS:g} m/s{remedy}")
+
+
+def _check_go(step: Mapping[str, Any], place: str) -> None:
+    """Raise AirTouchError for a `go` to two places or to none."""
+    if "to_m" in step and ("distance_m" in step or "direction_deg" in step):
+        raise AirTouchError(f"{place}: go takes to_m, or distance_m and direction_deg; not both")
+    if "direction_deg" in step and "distance_m" not in step:
+        raise AirTouchError(f"{place}: go with direction_deg needs distance_m")
+    if not {"to_m", "distance_m", "height_m"} & set(step):
+        raise AirTouchError(f"{place}: go needs to_m, distance_m or height_m")
 
 
 def _check_numbers(step: Mapping[str, Any], place: str) -> None:
@@ -114,15 +132,18 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
         pen.move(pen.at, step["time_s"])
     elif kind == "take-off":
         pen.motors = 1.0
-        pen.move(np.array([pen.at[0], pen.at[1], step["height_m"]]), step.get("time_s", 2.0))
+        _vertical(pen, step["height_m"], step.get("time_s", 2.0), place)
     elif kind == "hover":
         pen.move(pen.at, step["time_s"])
         if step.get("pulse_mps"):
             if pen.position or step.get("every_s", 0.0) < 0.1:
                 raise AirTouchError(f"{place}: pulses need velocity control and every_s of 0.1 or more")
-            place_in = np.arange(len(pen.rows[-1])) % round(step["every_s"] * RATE_HZ)
-            pen.rows[-1][place_in >= place_in.max() + 1 - PULSE_ROWS, c.VX] = step["pulse_mps"]
+            period = round(step["every_s"] * RATE_HZ)
+            pulses = np.arange(len(pen.rows[-1])) % period >= period - PULSE_ROWS
+            pen.rows[-1][pulses, c.VX] += step["pulse_mps"] * math.cos(pen.yaw)
+            pen.rows[-1][pulses, c.VY] += step["pulse_mps"] * math.sin(pen.yaw)
     elif kind == "go":
+        _check_go(step, place)
         to = pen.at.copy()
         if "to_m" in step:
             to[:2] = number_list(step, "to_m", place, 2)
@@ -137,7 +158,7 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
         length, width = number_list(step, "size_m", place, 2, above=0.0)
         corner = pen.at.copy()
         _check_duration(width / step["spacing_m"] / RATE_HZ, place)  # a row or more for each line
-        lines = int(width // step["spacing_m"]) + 1
+        lines = int(width / step["spacing_m"] + 1e-9) + 1  # a whole number of them but for rounding is that number
         _check_duration(lines * length / step["speed_mps"] + width / step["speed_mps"], place)
         for line in range(lines):
             y = corner[1] + line * step["spacing_m"]
@@ -145,13 +166,20 @@ def _run(pen: _Pen, kind: str, step: Mapping[str, Any], place: str) -> None:
                 to = np.array([corner[0] + x, y, corner[2]])
                 pen.move(to, np.linalg.norm(to - pen.at) / step["speed_mps"])
     else:
-        pen.move(np.array([pen.at[0], pen.at[1], pen.top(pen.at) - 0.1]), step.get("time_s", 3.0))
+        _vertical(pen, pen.top(pen.at) - 0.1, step.get("time_s", 3.0), place)
         pen.motors = 0.0
         pen.move(pen.at, 0.5)
 
 
+def _vertical(pen: _Pen, height_m: float, seconds: float, place: str) -> None:
+    """Climb or descend to a height. Raises AirTouchError where that is too fast."""
+    way = abs(height_m - pen.at[2])
+    _check_speed(way / seconds, place, f"; give time_s of {way / MAX_SPEED_MPS:.1f} s or more")
+    pen.move(np.array([pen.at[0], pen.at[1], height_m]), seconds)
+
+
 def _check_path(pen: _Pen, first: int, place: str) -> None:
-    rows = np.concatenate(pen.rows)[first::5]
+    rows = np.concatenate(pen.rows)[first:]
     if rows[0, c.MOTORS] == 0.0:
         raise AirTouchError(f"{place}: it has not taken off")
     struck = first_below(pen.world, rows[:, c.X:c.Z + 1])

@@ -107,8 +107,10 @@ def _beyond(world, k, x, y, distance):
 def below(world, x, y, z, radius):
     """The surfaces under a disc of `radius` m at (x, y, z): lower, upper, cover.
 
-    lower: row of World.surface that lies under the whole disc; upper: row of the higher one under part of it;
-    cover: share of the disc over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing.
+    lower: row of World.surface under the disc; upper: row of the higher one under part of it; cover: share of the disc
+    over that one, 0..1, as across a straight edge. With a cover of 0 upper means nothing. Where several platforms each
+    reach under a part of the disc, lower and upper are the highest two of them, as if the lower one were under all of
+    the rest; what is between and beside them is left out.
     """
     n = len(world.first) - 1
     lower, upper, cover = n, n, 0.0
@@ -158,6 +160,18 @@ def top_at(world, x, y):
             if inside_by(world.corners, world.first[k], world.first[k + 1], x, y) >= 0.0:
                 return world.surface[k, TOP]
     return world.surface[len(world.first) - 1, TOP]
+
+
+@jit
+def in_side(world, x, y, z):
+    """Whether the point is inside a platform, by more than ABOVE_M under its top: it came through its side."""
+    for k in range(len(world.first) - 2, -1, -1):
+        if world.surface[k, TOP] <= z + ABOVE_M:
+            return False
+        if not _beyond(world, k, x, y, 0.0):
+            if inside_by(world.corners, world.first[k], world.first[k + 1], x, y) >= 0.0:
+                return True
+    return False
 
 
 @jit

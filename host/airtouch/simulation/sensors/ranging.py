@@ -21,6 +21,7 @@ CONE_TANGENT = 0.12  #: spot radius over distance (a half angle of 7 degrees car
 LEAST_SPOT_M = 0.002  #: radius of the spot where the sensor stands on the ground, so that shares are defined
 #: share of the new surface in a reading that saw two: where it is more than this, a reading beyond an edge overshoots
 OVERSHOOT_SHARE = 0.5
+FIRST_DOWN_M = 0.01  #: m, down range that is logged before the first reading; chosen
 LONG_AGO_S = 1000.0  #: since the last change below, at the start of a flight
 STATE = np.dtype([
     ("count", np.int64),  # down range measurements so far
@@ -45,7 +46,7 @@ STATE = np.dtype([
 def begin(s, top):
     """Set the sensors for a vehicle that stands on a surface of that height, m."""
     s.start_top = s.seen_top = s.below_top = top
-    s.down, s.changed_s = 0.01, -LONG_AGO_S
+    s.down, s.changed_s = FIRST_DOWN_M, -LONG_AGO_S
 
 
 @jit

@@ -23,8 +23,8 @@ def write(folder: Path, scenario: Scenario, numbers: Sequence[int], *, vehicle: 
           ) -> Iterator[Diverged | None]:
     """Fly flights and write each into `folder`; yields None, or how the flight diverged, one by one.
 
-    plugins: texts of effect files that each process registers first. Raises AirTouchError
-    when a process dies (the flights written so far are whole).
+    plugins: texts of effect files that each process registers first; with one worker, which is this process, they must
+    be registered already. Raises AirTouchError when a process dies (the flights written so far are whole).
     """
     job = (folder, scenario, vehicle, effects, tuple(without), seed)
     if workers == 1:

@@ -1,12 +1,15 @@
 """A folder of simulated flights: what was asked for, what is there, what went wrong.
 
-`run.json` holds the request; a second run with another request is refused. A flight is
+`run.json` holds the request, with the version of AirTouch and the firmware's settings; a second run with another
+request is refused, and so is one over flights of which run.json does not say these. A flight is
 written under a temporary name and renamed, so a file that is there is whole, and after a
 kill the same command flies only what is missing. Flights that diverged are listed in
 `diverged.jsonl` and have no file.
 """
 
+import csv
 import hashlib
+import io
 import json
 import os
 import re
@@ -17,7 +20,7 @@ from typing import Any
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs import json_lines
-from airtouch.logs.files import MANIFEST, make_folder, read_text
+from airtouch.logs.files import MANIFEST, load_bytes, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.flight import Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
@@ -43,10 +46,11 @@ def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -
     if known.is_file() and known.read_bytes() == text.encode():  # bytes, as a damaged one may be no text
         return
     if known.is_file():
-        own = _of_request(folder, known)
+        old, own = _of_request(folder, known)
         if not force:
-            raise AirTouchError(f"{folder}: holds flights of another request; "
-                                "choose another --out, or --force")
+            other = sorted(key for key in {*request, *old} if _as_text(request, key) != _as_text(old, key))
+            raise AirTouchError(f"{folder}: holds flights of another request (other or not known: "
+                                f"{', '.join(other) or 'its form'}); choose another --out, or --force")
         for path in own:
             path.unlink(missing_ok=True)
     elif [*folder.glob("*.csv.gz"), *folder.glob("*.jsonl")]:
@@ -56,14 +60,22 @@ def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -
     temporary.replace(known)
 
 
-def _of_request(folder: Path, known: Path) -> list[Path]:
-    """What the request in a folder's run.json wrote beside it. Raises AirTouchError for a file that is no request."""
+def _as_text(request: Mapping[str, Any], key: str) -> str | None:
+    """The value of a key as run.json holds it; None where there is none."""
+    return json.dumps(request[key], sort_keys=True) if key in request else None
+
+
+def _of_request(folder: Path, known: Path) -> tuple[dict[str, Any], list[Path]]:
+    """The request in a folder's run.json, and what it wrote beside it.
+
+    Raises AirTouchError for a file that is no request.
+    """
     try:
         request = json.loads(known.read_text(encoding="utf-8"))
         scenario, seed = str(request["scenario"]), int(request["seed"])
     except (ValueError, KeyError, TypeError):
         raise AirTouchError(f"{known}: not the request of a simulation; choose another --out") from None
-    return [*_flights(folder, scenario, seed).values(), folder / FAILED, folder / MANIFEST]
+    return request, [*_flights(folder, scenario, seed).values(), folder / FAILED, folder / MANIFEST]
 
 
 def check_manifest(folder: Path) -> None:
@@ -71,10 +83,18 @@ def check_manifest(folder: Path) -> None:
     path = folder / MANIFEST
     if not path.exists():
         return
-    head, *rows = path.read_text(encoding="utf-8", errors="replace").splitlines() or [""]
-    if head != HEAD or not all(FLIGHT.fullmatch(row.split(",")[0]) for row in rows):
+    head, *rows = load_bytes(path).decode(errors="replace").splitlines() or [""]
+    if head != HEAD or not all(FLIGHT.fullmatch(_file_of(row)) for row in rows):
         raise AirTouchError(f"{path}: not written by a simulation, and its flights need another; "
                             "choose another folder, or move it away")
+
+
+def _file_of(row: str) -> str:
+    """The first cell of a row of a manifest; "" where there is none."""
+    try:
+        return next(csv.reader([row]), [""])[0]
+    except csv.Error:
+        return ""
 
 
 def path_of(folder: Path, scenario: str, seed: int, flight: int) -> Path:
@@ -134,7 +154,7 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
     """
     check_manifest(folder)
     path = folder / MANIFEST
-    listed = {row.split(",")[0]: row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
+    listed = {_file_of(row): row for row in read_text(path).splitlines()[1:]} if path.exists() else {}
     lines = [HEAD, *(row for name, row in listed.items() if (folder / name).exists())]
     for number, flight in _flights(folder, scenario.name, seed).items():
         if flight.name in listed:
@@ -143,7 +163,9 @@ def write_manifest(folder: Path, scenario: Scenario, seed: int) -> None:
         height = f"{1000 * values['clearance']:.0f}mm" if is_number(values.get("clearance")) else ""
         cells = [flight.name, "clean", number % 5, height, values.get("angle", ""), values.get("wind", "none"),
                  values.get("speed", "")]
-        lines.append(",".join(f"{c:.4g}" if isinstance(c, float) else str(c) for c in cells))
+        text = io.StringIO()
+        csv.writer(text, lineterminator="").writerow([f"{c:.4g}" if isinstance(c, float) else c for c in cells])
+        lines.append(text.getvalue())
     temporary = folder / f".{MANIFEST}.{os.getpid()}"
     temporary.write_text("\n".join(lines) + "\n")
     temporary.replace(folder / MANIFEST)

@@ -1,5 +1,6 @@
 // As much of FreeRTOS as the app's shell uses. These stand-ins have the interfaces of crazyflie-firmware 2026.08;
-// shell_driver.c is behind them. The firmware's own headers take the same sources: see test_firmware.py.
+// shell_driver.c and height_driver.c are behind them. The firmware's own headers take the same sources: see
+// test_firmware.py.
 #pragma once
 
 #include <stdbool.h>
