@@ -1,22 +1,32 @@
 """`airtouch train` and `airtouch export` from the outside: bad input, exit codes, stale sources."""
 
+import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from airtouch import logs
+from airtouch import kernels, logs, reference
+from airtouch import vehicle as vehicles
 from airtouch.cli import main
 from airtouch.cli.learning import export as export_command
 from airtouch.cli.learning import train as train_command
 from airtouch.detector import best, registry
 from airtouch.detector.evaluation.data import simulated
+from airtouch.detector.shared import vehicle_header
 from airtouch.errors import AirTouchError
+from airtouch.reference.motion_channels import MotionConfig
 from made_flight import SMALL, made_flight
 from small_model import random_model
+
+#: level acceleration, rates and motors of four seconds at a mean PWM of 14,000
+FLIGHT = (np.tile([0.0, 0.0, 9.81], (400, 1)), np.zeros((400, 3)),
+          np.tile(14000.0 + 500.0 * np.sin(np.arange(400) / 9)[:, None], (1, 4)))
 
 
 class Told(NamedTuple):
@@ -149,6 +159,39 @@ def test_simulated_training_refuses_in_one_line(tmp_path: Path, arguments: tuple
     result = train(*arguments, "--out", tmp_path / "m.npz")
     assert result.exit_code != 0 and not (tmp_path / "m.npz").exists()
     assert message in (str(result.exception) + result.output)
+
+
+def test_best_is_trained_and_exported_for_the_thrust_curve_of_another_vehicle(tmp_path: Path) -> None:
+    """The curve, the gravity and the PWM in the air are those of the vehicle's file, on the desktop and in C."""
+    pytest.importorskip("tensorflow", reason="training needs the extra 'train'")
+    (tmp_path / "mine").mkdir()
+    logs.write(made_flight(0), tmp_path / "mine" / "f.csv")
+    (tmp_path / "own.toml").write_text((Path(vehicles.__file__).parent / "vehicles/crazyflie-2.1-brushless.toml")
+                                       .read_text().replace("crazyflie-2.1-brushless", "own"))
+    best.fit([made_flight(8)], recipe=SMALL).save(tmp_path / "old.npz")
+    start = ("--start", tmp_path / "old.npz", "--steps", SMALL.steps)
+    result = train(tmp_path / "mine", *start, "--vehicle", tmp_path / "own.toml", "--out", tmp_path / "new.npz")
+    assert result.exit_code == 0, result.output
+    model, own = best.load(tmp_path / "new.npz"), vehicles.load(tmp_path / "own.toml")
+    assert model.recipe.motion.vehicle == own and model.recipe.motion.arm_pwm == own.arm_pwm == 11700
+    (built_for,) = re.findall('AIRTOUCH_STREAM_THRUST "(.*)"', "".join(model.c_sources().values()))
+    assert built_for in vehicle_header.render(own)
+    assert built_for not in vehicle_header.render(vehicles.load())
+    x, airborne = kernels.motion_channels(*FLIGHT, model.recipe.motion)
+    np.testing.assert_allclose(x, reference.motion_channels(*FLIGHT, MotionConfig(vehicle=own, arm_pwm=11700))[0],
+                               atol=1e-3)
+    assert airborne.all() and np.abs(x - kernels.motion_channels(*FLIGHT)[0]).max() > 0.01
+    assert train(tmp_path / "mine", "--detector", "paper", "--vehicle", "own.toml").exit_code == 2
+    damaged = replace(model, recipe=replace(model.recipe, vehicle=replace(own, mass_kg=-1.0)))
+    damaged.save(tmp_path / "bad.npz")
+    with pytest.raises(AirTouchError, match="mass_kg"):
+        best.load(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize("name", ["best", "best_without_acceleration"])
+def test_the_files_of_models_for_the_default_vehicle_are_as_they_were(name: str) -> None:
+    path = Path(vehicles.__file__).parent / "models" / f"{name}.npz"
+    assert best.load(path).to_bytes() == path.read_bytes()
 
 
 def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path) -> None:

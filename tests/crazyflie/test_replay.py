@@ -14,6 +14,8 @@ from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
+from airtouch.detector.shared import sensors
+from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import batch
 
 
@@ -64,6 +66,17 @@ def test_the_commanded_speed_is_asked_for_by_its_own_name(flight, tmp_path):
     assert "--flown-at" in str(asked.exception) and "--speed" not in str(asked.exception)
     both = [CliRunner().invoke(airtouch, ["replay", str(flight), name, "1000"]) for name in ("--speed", "--rate")]
     assert both[0].output == both[1].output and both[0].exit_code == 0
+
+
+@pytest.mark.parametrize("sensor", sensors.SENSORS)
+def test_a_flight_without_a_sensor_and_without_down_range_is_replayed(flight, tmp_path, sensor):
+    log = sensors.without(logs.read(flight), (sensor,))
+    path = tmp_path / "f.csv"
+    logs.write(FlightLog({name: x for name, x in log.columns.items() if name not in ("zrange_m", "z_m")}, log.meta),
+               path)
+    result = CliRunner().invoke(airtouch, ["replay", str(path), "--flown-at", "0.3"])
+    assert result.exit_code == 0, result.output
+    assert "detected at" in result.output
 
 
 def test_pieces_of_one_row_give_the_same(flight):

@@ -1,8 +1,12 @@
 """The decoder of the streaming network's logits, step by step on logits whose edges are counted by hand."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from airtouch.errors import AirTouchError
 from airtouch.reference.edge_decoder import DecoderConfig, edge_decoder
 
 QUIET = DecoderConfig(arm_steps=5, dwell_steps=3, look_back=4, late_entry=99.0, late_exit=-99.0)
@@ -130,6 +134,15 @@ def test_logits_that_are_no_number_say_no():
     with_exit[20, 2] = -4.1
     assert edges(with_exit) == [(12, 1)]
     assert edges(np.zeros((0, 3))) == []
+
+
+def test_the_crossing_is_looked_for_as_far_back_as_the_drone_keeps_logits():
+    """The ring of edge_decoder.h holds this step and as many before it as may be asked for."""
+    header = (Path(__file__).parents[2] / "firmware/kernels/edge_decoder.h").read_text()
+    kept = int(re.search(r"#define EDGE_DECODER_RING (\d+)", header).group(1))
+    assert DecoderConfig(look_back=kept - 1).look_back == 63
+    with pytest.raises(AirTouchError, match="look_back is 64, at most 63"):
+        DecoderConfig(look_back=kept)
 
 
 def test_logits_are_clamped_at_eight():

@@ -102,6 +102,7 @@ def test_flights_are_shown_from_the_best_found_to_the_worst():
     assert [f.score.file for f in chosen] == ["good.csv", "false.csv", "blind.csv"]
     assert [set(f.others) for f in chosen] == [{"paper"}, set(), set()]
     assert [f.score.file for f in shown_flights(results, 2)] == ["good.csv", "blind.csv"]
+    assert [f.score.file for f in shown_flights(results, 6)] == ["good.csv", "false.csv", "blind.csv"]
 
 
 def test_flights_of_one_name_in_two_folders_have_their_own_traces():

@@ -27,5 +27,5 @@ def random_windows(n: int, seed: int = 0) -> np.ndarray:
 def random_model(seed: int = 0, sparsity: float = 0.0) -> Model:
     """A model of made-up weights, quantised by TensorFlow Lite."""
     weights = random_weights(seed, sparsity)
-    int8, tflite = quantisation.quantise(weights, random_windows(200, seed + 1))
+    int8, tflite = quantisation.quantise_network(weights, random_windows(200, seed + 1))
     return Model(weights, int8, tflite, {"detector": "paper", "seed": seed})

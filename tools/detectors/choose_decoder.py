@@ -1,17 +1,20 @@
 """Chooses the `best` detector's decoder settings from cross-validated models.
 
-    airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, by fold or by day
+    airtouch crossval --detector best --seed S --out DIR_S      # for some seeds, all by fold or all by day
     python tools/detectors/choose_decoder.py DIR_0 DIR_1 ...    # a minute a folder of 87 flights
 
 Each flight is decoded from the logits of the model that never saw it, once for each folder; with --silence SENSOR from
 the log without that sensor. Prints the settings that are best over all folds, and an honest figure for choosing them:
-each fold scored with the settings best on the others. host/docs/results.md has that figure of the shipped settings.
+each fold scored with the settings best on the others; a flight counts once, whatever the number of folders.
+host/docs/results.md has that figure of the shipped settings. In the JSON of that figure `by_fold` has the settings and
+the lag of each fold's scores; `lag_s` and `parameters` are those that are best over all folds.
 """
 
 import argparse
 import json
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +29,7 @@ from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import TOLERANCE_S, FlightScore, match, score_flight
+from airtouch.detector.evaluation.summary import one_a_flight
 from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, in_one_line
@@ -48,7 +52,7 @@ class HeldOutFlight:
     """
 
     file: dataset.FlightFile
-    fold: int
+    fold: int | str
     speed: float
     true: list[Edge]
     flying: np.ndarray
@@ -63,7 +67,8 @@ class HeldOutFlight:
         return [e.sample for e in self.true]
 
 
-def held_out_flight(file: dataset.FlightFile, fold: int, model: BestModel, silent: tuple[str, ...]) -> HeldOutFlight:
+def held_out_flight(file: dataset.FlightFile, fold: int | str, model: BestModel,
+                    silent: tuple[str, ...]) -> HeldOutFlight:
     """A flight read and run through the model of its fold, without the sensors `silent`."""
     if file.condition.speed_mps is None:
         raise AirTouchError(f"{file.path}: no speed, which turns seconds into metres; add a column speed_mps to the "
@@ -142,14 +147,33 @@ def cheapest(flights: list[HeldOutFlight], results: Results) -> int:
     return int(np.argmin([cost(flights, outcomes_of) for outcomes_of in results]))
 
 
-def choices(flights: list[HeldOutFlight], results: Results) -> dict[int, tuple[int, float]]:
-    """Fold -> (index of the settings that are best on the flights of the other folds, their lag there)."""
+def choices(flights: list[HeldOutFlight], results: Results) -> dict[int | str, tuple[int, float]]:
+    """Fold -> (index of the settings that are best on the flights of the other folds, their lag there).
+
+    Raises AirTouchError for a flight of two folds, which would choose the settings that it is scored with.
+    """
+    fold_of: dict[Path, int | str] = {}
+    for flight in flights:
+        if fold_of.setdefault(flight.file.path, flight.fold) != flight.fold:
+            raise AirTouchError(f"{flight.file.path}: in fold {fold_of[flight.file.path]} of one folder and in "
+                                f"{flight.fold} of another; give folders of one kind, all by fold or all by day")
     chosen = {}
-    for fold in {flight.fold for flight in flights}:
+    for fold in dict.fromkeys(flight.fold for flight in flights):
         others = [k for k, flight in enumerate(flights) if flight.fold != fold]
         choice = cheapest([flights[k] for k in others], [[of[k] for k in others] for of in results])
         chosen[fold] = choice, lag_of([results[choice][k] for k in others])
     return chosen
+
+
+def nested(flights: list[HeldOutFlight], settings: list[DecoderConfig],
+           results: Results) -> tuple[list[FlightScore], dict[str, dict[str, Any]]]:
+    """One score a flight over all folders, with the settings best on the other folds; fold -> its lag and settings."""
+    scores: list[FlightScore] = []
+    by_fold: dict[str, dict[str, Any]] = {}
+    for fold, (choice, lag) in choices(flights, results).items():
+        scores += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
+        by_fold[str(fold)] = {"lag_s": lag, **asdict(settings[choice])}
+    return one_a_flight(scores), by_fold
 
 
 def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderConfig]:
@@ -189,10 +213,9 @@ def main() -> None:
     winner = cheapest(flights, results)
     print_figures("one setting, best over all folds", flights, results[winner])
     print(json.dumps(asdict(settings[winner])))
-    nested: list[FlightScore] = []
-    for fold, (choice, lag) in choices(flights, results).items():
-        nested += [score(flight, settings[choice], lag) for flight in flights if flight.fold == fold]
-    result = evaluate.as_json("best", nested, [], lag_of(results[winner]), asdict(settings[winner]))
+    scores, by_fold = nested(flights, settings, results)
+    result = {**evaluate.as_json("best", scores, [], lag_of(results[winner]), asdict(settings[winner])),
+              "by_fold": by_fold}
     output.print_table(output.console(), {"best": result, **result["by_height"]},
                             "each fold with the settings best on the others")
     if options.json:

@@ -11,7 +11,7 @@ from airtouch.crazyflie.view.host_detector import HostDetector
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import FlightFile
-from airtouch.logs import airborne
+from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
 
@@ -25,7 +25,7 @@ def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
     """
     if log.has("x_m", "y_m") or speed_mps is None:
         return {}
-    along = np.cumsum(airborne(log)) * SAMPLE_PERIOD_S * speed_mps
+    along = np.cumsum(sensors.airborne_by(log)[0]) * SAMPLE_PERIOD_S * speed_mps
     return {"x_m": along, "y_m": np.zeros(len(log))}
 
 

@@ -49,16 +49,13 @@ def infer_int8(model: Model, windows: np.ndarray) -> np.ndarray:
     x = np.ascontiguousarray(_windows(model.int8.input_shape, windows), dtype=np.float32)
     quantised = np.empty(x.shape, dtype=np.int8)
     lib.networkInt8BatchQuantise(flat, pointer(x), x.size, pointer(quantised))
-    return run_int8(model.int8, quantised)
+    return _outputs(flat, model.int8, quantised)
 
 
 def run_int8(network: Int8Network, quantised: np.ndarray) -> np.ndarray:
     """int8 outputs (n, outputs) of quantised inputs (n, ...). Reference: `int8_network.run`."""
     flat, keep = _flat_int8(network)
-    x = np.ascontiguousarray(_windows(network.input_shape, quantised), dtype=np.int8)
-    outputs = np.empty((len(x), network.outputs), dtype=np.int8)
-    lib.networkInt8Batch(flat, pointer(x), len(x), _arena(flat), pointer(outputs))
-    return outputs
+    return _outputs(flat, network, np.ascontiguousarray(_windows(network.input_shape, quantised), dtype=np.int8))
 
 
 def infer_float(layers: Sequence[FloatLayer], windows: np.ndarray) -> np.ndarray:
@@ -87,7 +84,7 @@ def probability(model: Model, windows: np.ndarray) -> np.ndarray:
 
 
 def platform_probability(logits: np.ndarray, scale: float) -> np.ndarray:
-    """P(over a platform), (n,): softmax of the second of two int8 logits, (n, 2), which are in units of `scale`."""
+    """P(over a platform), (n,): softmax of the second of two logits, (n, 2), in units of `scale`."""
     difference = logits[:, 1].astype(np.float64) - logits[:, 0]
     return 1.0 / (1.0 + np.exp(-scale * difference))
 
@@ -189,6 +186,13 @@ def _flat_int8(network: Int8Network) -> tuple[Any, list[np.ndarray]]:
     flat, keep = flat_layers(network.layers)
     valid_size(lib.networkInt8BatchArena(flat))
     return flat, keep
+
+
+def _outputs(flat: Any, network: Int8Network, x: np.ndarray) -> np.ndarray:
+    """int8 outputs (n, outputs) of quantised inputs (n, inputs) by the C view of a network."""
+    outputs = np.empty((len(x), network.outputs), dtype=np.int8)
+    lib.networkInt8Batch(flat, pointer(x), len(x), _arena(flat), pointer(outputs))
+    return outputs
 
 
 def _windows(shape: tuple[int, int, int], windows: np.ndarray) -> np.ndarray:

@@ -73,12 +73,21 @@ def probability_of_samples(model: ScaledModel, features: np.ndarray, stride: int
 
     Held between two outputs; NaN before the first one and where a feature is not finite.
     """
-    network = model.int8
-    usable = np.isfinite(features).all(axis=1)
+    outputs, valid = answers_of_samples(model, features, stride)
+    return held(platform_probability(outputs, model.int8.layers[-1].output_scale), valid, features)
+
+
+def answers_of_samples(model: ScaledModel, features: np.ndarray, stride: int) -> tuple[np.ndarray, np.ndarray]:
+    """int8 outputs (n, outputs) of fused features (n, c), and where there is one, (n,) bool, as `run_rolling` does."""
     inputs = fixed_scale(model.scale.mean, model.scale.deviation, features)
-    first = network.layers[0]
-    outputs, valid = run_rolling(network, quantise(inputs, first.input_scale, first.input_zero_point), stride, usable)
-    probability = platform_probability(outputs, network.layers[-1].output_scale)
+    first = model.int8.layers[0]
+    return run_rolling(model.int8, quantise(inputs, first.input_scale, first.input_zero_point), stride,
+                       np.isfinite(features).all(axis=1))
+
+
+def held(probability: np.ndarray, valid: np.ndarray, features: np.ndarray) -> np.ndarray:
+    """The probabilities (n,), each held until the next valid one; NaN until the first after features not finite."""
+    usable = np.isfinite(features).all(axis=1)
     latest = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), -1))
     broken = np.maximum.accumulate(np.where(usable, -1, np.arange(len(valid))))
     return np.where(latest > broken, probability[latest], np.nan)

@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.errors import AirTouchError
+
 #: The logits that the decoder reads, the first columns; kernel_types.h has their number for C.
 LOGITS = ("over", "entry", "exit")
 #: largest magnitude of a logit, a probability of 0.9997: one wild logit moves the smoothed one no further
 LOGIT_LIMIT = 8.0
 SMOOTHED_AT_START = -3.0  #: smoothed over logit before anything is known: over a platform with a probability of 0.05
+MOST_LOOK_BACK = 63  #: steps, the largest `look_back`: one less than EDGE_DECODER_RING in edge_decoder.h
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was
 
 
@@ -20,7 +23,7 @@ class DecoderConfig:
     exit logit - over_share * over logit > exit_score; or late, where the over logit smoothed
     by smooth_gain a step passes late_entry upwards or late_exit downwards. The crossing is taken to be where
     the event's logit peaked within look_back steps before (or while the edge waits); the edge is reported
-    hold_steps after it, at once where that has passed.
+    hold_steps after it, at once where that has passed. Raises AirTouchError for a look_back above MOST_LOOK_BACK.
     """
 
     over_share: float = 0.5
@@ -33,6 +36,10 @@ class DecoderConfig:
     arm_steps: int = 100
     look_back: int = 50
     hold_steps: int = 0
+
+    def __post_init__(self) -> None:
+        if self.look_back > MOST_LOOK_BACK:
+            raise AirTouchError(f"edge decoder: look_back is {self.look_back}, at most {MOST_LOOK_BACK} steps are kept")
 
 
 @dataclass(slots=True)

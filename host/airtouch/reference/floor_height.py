@@ -6,10 +6,17 @@ reading changed by beyond the vertical velocity is the floor's. See firmware/app
 
 import math
 
-#: _M in metres, _MS in milliseconds, _MPS in m/s, shares and cosines without unit; floor_height.h says what each is
-#: and why.
-STEP_M, TILT_SHARE, TILT_COSINE, BEAM_COSINE = 0.06, 0.5, 0.87, 0.1
-GAP_MS, TRUST_M, HOME_M, FADE_MPS, MOST_M, FLOW_NEAREST_M = 150, 0.15, 0.08, 0.05, 2.5, 0.08
+# Chosen in the simulated drone, as in floor_height.h; host/docs/height.md has what each choice costs.
+STEP_M = 0.06  #: m, least step of the floor: a climb of 1 m/s makes 0.025 m between two readings at 40 Hz
+TILT_SHARE = 0.5  #: share of the range times (1 - cosine of the tilt) by which the least step grows
+TILT_COSINE = 0.87  #: cosine of 30 degrees: with more tilt no step is learnt
+BEAM_COSINE = 0.1  #: cosine of 84 degrees: with more tilt a reading is passed on as it is; round number
+GAP_MS = 150  #: ms, six readings: after a longer gap a reading is compared with the height instead
+TRUST_M = 0.15  #: m, the floor is kept after a gap where the height agrees with it so closely
+HOME_M = 0.08  #: m, a smaller sum of steps is the first floor, and fades
+FADE_MPS = 0.05  #: m/s, speed at which it fades
+MOST_M = 2.5  #: m, no floor is further from the first one: the sum of steps starts again
+FLOW_NEAREST_M = 0.08  #: m, least range of the flow sensor (PMW3901): its picture does not scale below
 
 
 class FloorHeight:

@@ -44,7 +44,7 @@ CHANNEL_TABLE = (
 )
 #: Names of all columns: the last one is 0, so that they come in blocks of four.
 NAMES = (*(channel.name for channel in CHANNEL_TABLE), "zero")
-THRUST_DELAY = 2  #: samples from a command to its thrust
+THRUST_DELAY = 2  #: samples from a command to its thrust, MOTION_THRUST_DELAY in motion_channels.h; chosen
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,11 @@ class MotionConfig:
     """Settings; the samples are those of a 100 Hz log.
 
     scale: nominal amplitude of each of CHANNEL_TABLE: m/s^2 (3), rad/s (3), PWM (4), m/s^2. limit: channels are
-    clamped to that many amplitudes. slow_samples: time constant of the motors' slow means.
+    clamped to that many amplitudes. arm_pwm: mean PWM above which the drone is in the air. slow_samples: time constant
+    of the slow means of motors and thrust. lag_samples: time constant of the thrust behind the command, after
+    THRUST_DELAY. settle_samples: for so long after take-off the slow means follow at once. least_thrust_n: N, sum of
+    the motors' slow mean thrust that is divided by at least, so that a drone on the ground divides by no zero. vehicle:
+    its thrust curve and gravity. Those without a source here are chosen; a model is trained with them.
     """
 
     scale: tuple[float, ...] = tuple(channel.amplitude for channel in CHANNEL_TABLE)

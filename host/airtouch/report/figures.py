@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airtouch.detector.evaluation.score_report import HitCurve, Reliability
-from airtouch.detector.shared.channels import NAMES
+from airtouch.detector.shared.channels import PAPER_CHANNELS
 from airtouch.detector.shared.sensors import GRAVITY_MPS2
 from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
@@ -130,8 +130,8 @@ def _band_power(ax: Axes, plotted: PlottedFlight) -> None:
     level = 10 * np.log10(np.maximum(plotted.trace.signals["band_power"].astype(float), LEAST_BAND_POWER))
     level -= np.nanmedian(level, axis=0)
     ax.imshow(level.T, aspect="auto", cmap="magma", vmin=-5, vmax=20, interpolation="nearest",
-              extent=(plotted.time_s[0], plotted.time_s[-1], len(NAMES) - 0.5, -0.5))
-    ax.set_yticks(range(len(NAMES)), NAMES, fontsize=6)
+              extent=(plotted.time_s[0], plotted.time_s[-1], len(PAPER_CHANNELS) - 0.5, -0.5))
+    ax.set_yticks(range(len(PAPER_CHANNELS)), PAPER_CHANNELS, fontsize=6)
     ax.set_ylabel("band power\ndB on median", fontsize=8)
 
 

@@ -15,7 +15,7 @@ from airtouch.detector import best
 from airtouch.detector.best import batches, quantisation, training
 from airtouch.detector.best import model as model_file
 from airtouch.detector.best.network import float_logits, keras_model, weight_names
-from airtouch.detector.best.outputs import OUTPUTS, goals
+from airtouch.detector.best.outputs import OUTPUTS, training_targets
 from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE, Recipe
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS, FlightLog
@@ -180,7 +180,7 @@ def test_goals_peak_where_their_edge_is_due():
     over = np.zeros(400, dtype=np.uint8)
     over[100:300] = 1
     edges = [logs.Edge(100, "entry", 0.8, 0.05), logs.Edge(300, "exit", 0.05, 0.8)]
-    targets = goals(over, edges, SMALL)
+    targets = training_targets(over, edges, SMALL)
     assert targets.shape == (400, len(OUTPUTS)) and targets.dtype == np.float32
     assert np.array_equal(np.flatnonzero(targets[:, 0]), np.arange(100, 300) + SMALL.over_delay)
     for column, edge in ((1, edges[0]), (2, edges[1])):

@@ -7,7 +7,7 @@ import pytest
 
 from airtouch.detector import best
 from airtouch.detector.best import batches, export, model, network, outputs, recipe, training
-from airtouch.detector.best.operations import CONV
+from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.shared import sensors
@@ -23,7 +23,7 @@ def changed(monkeypatch):
 
     def graph(self):
         layers = list(shipped_graph(self))
-        layers[2] = StreamLayer("layer2", CONV, 1, self.width, self.width, pruned=True)
+        layers[2] = StreamLayer("layer2", CAUSAL_CONV, 1, self.width, self.width, pruned=True)
         return tuple(layers)
 
     anew = (*OUTPUTS, Output("beside", 0.0, lambda _: 0.5, lambda over, *_: (1 - over).astype(np.float32)))

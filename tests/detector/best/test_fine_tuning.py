@@ -68,13 +68,22 @@ def test_pseudo_labels_are_the_detections_without_the_lag(small):
     assert [e.kind for e in labels] == [e.kind for e in edges]
 
 
-def test_free_air_is_drawn_and_has_no_goals():
+def test_pseudo_labels_of_a_log_without_a_sensor_are_less_the_lag_of_the_model_that_serves_it(small):
+    keen = replace(small, metadata={**small.metadata, "lag_s": 0.5, "decoder_without": {}, "decoder": {
+        **small.metadata["decoder"], "entry_score": -6.0, "exit_score": -6.0}})
+    log = sensors.without(blind(made_flight(7)), ("motors",))
+    ((*labels,),) = best.pseudo_labels([log], replace(small, spares={"motors": keen}))
+    edges = best.run(log, keen).edges
+    assert edges and [e.sample for e in labels] == [max(e.sample - 50, 0) for e in edges]
+
+
+def test_free_air_is_drawn_and_has_no_targets():
     from airtouch.detector.best import batches
 
     recipe = best.Recipe(batch=16, crop=64, warm_up=16, free_air_share=0.5, edge_share=1.0)
     flight = batches.flight_of(made_flight(0), recipe)
     calm = batches.flight_of(made_flight(1), recipe, ())
-    assert not calm.goals[:, :len(LOGITS)].any() and not len(calm.edges)
+    assert not calm.targets[:, :len(LOGITS)].any() and not len(calm.edges)
     _, y = batches.batch([flight], recipe, np.random.default_rng(0), [calm])
     sweeps_only = [batches.batch([flight], recipe, np.random.default_rng(k))[1].any(axis=(1, 2)).mean()
                    for k in range(20)]

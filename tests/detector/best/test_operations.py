@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from airtouch.detector.best import operations
-from airtouch.detector.best.operations import CONV, HEAD
+from airtouch.detector.best.operations import CAUSAL_CONV, HEAD
 from airtouch.reference.networks.int8_network import Int8Layer, requantise
 from airtouch.reference.networks.stream_graph import StreamLayer, taps_of
 from airtouch.reference.networks.stream_int8 import int8_layer
@@ -40,11 +40,11 @@ def case(name):
 
 
 def test_a_convolution_is_a_filter_of_each_channel_added_up():
-    layer, kernel, bias, x = case(CONV)
+    layer, kernel, bias, x = case(CAUSAL_CONV)
     taps = np.zeros((2 * layer.dilation + 1, WIDTH, WIDTH))
     taps[::layer.dilation] = kernel[::-1]  # newest first
     true = sum(np.column_stack([lfilter(taps[:, i, o], 1.0, x[:, i]) for o in range(WIDTH)]) for i in range(WIDTH))
-    np.testing.assert_allclose(OPERATIONS[CONV].rows(layer, kernel, bias, x), true + bias, atol=1e-5)
+    np.testing.assert_allclose(OPERATIONS[CAUSAL_CONV].rows(layer, kernel, bias, x), true + bias, atol=1e-5)
 
 
 @needs("tensorflow")

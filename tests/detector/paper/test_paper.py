@@ -12,7 +12,7 @@ from airtouch.detector.paper import features
 from airtouch.detector.paper.decoding import detections
 from airtouch.detector.shared.channels import level_acceleration, thrust_axis
 from airtouch.errors import AirTouchError
-from airtouch.logs.flight_log import GYRO, PWM
+from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from airtouch.parameters import DEFAULT
 from airtouch.reference.edge_pipeline import EdgePipelineConfig
 from made_flight import made_flight
@@ -44,6 +44,15 @@ def test_edges_are_those_of_the_reference_pipeline(log, model):
         config=EdgePipelineConfig(settings, physical_filter=physical))
     assert trace.edges and trace.edges == detections(events.edge, trace.probability)
     assert not physical
+
+
+def test_a_vehicle_is_in_the_air_above_its_own_pwm():
+    """At a mean PWM of 13,000 the brushless Crazyflie flies (its file says above 11,700), the other one does not."""
+    log = made_flight(4)
+    low = log.with_columns({name: np.full(len(log), 13000.0) for name in PWM})
+    assert features.pipeline(low, vehicle=vehicle.load("crazyflie-2.1-brushless")).armed.any()
+    assert features.pipeline(FlightLog(low.columns, {**low.meta, "vehicle": "crazyflie-2.1-brushless"})).armed.any()
+    assert not features.pipeline(low).armed.any()
 
 
 def test_the_filter_drops_edges_and_changes_no_probability(log, model):

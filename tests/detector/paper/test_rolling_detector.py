@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import short_flights
 from airtouch import logs
 from airtouch.detector import paper
 from airtouch.detector.evaluation.data.dataset import collect
@@ -13,6 +14,7 @@ from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import normalisation, rolling
 from airtouch.detector.paper.features import feature_windows, flight_features
 from airtouch.errors import AirTouchError
+from airtouch.kernels.network import infer_float
 from airtouch.kernels.rolling import rolling_size
 from airtouch.reference.networks import int8_network
 from detector.paper.test_training import made_flight
@@ -36,6 +38,21 @@ def test_a_real_flight_has_the_answers_of_its_windows(model, flights: Path):
     # The logarithm is a float series in C and exact here: an input on a rounding edge may differ by one step.
     differences = np.array([probability[i] - of_window[i + ahead] for i in answers])
     assert (differences == 0).mean() > 0.9 and np.abs(differences).max() < 0.15
+
+
+def test_in_float_it_answers_when_it_does_in_int8_of_the_same_windows(model):
+    """So that only quantisation tells the two apart: the float network over the window of each int8 answer."""
+    log = short_flights.fly(1)[0]
+    log = log.with_columns({"gyro_x_radps": np.where(np.arange(len(log)) == 700, np.nan, log["gyro_x_radps"])})
+    quantised, in_float = rolling.run(log, model).probability, rolling.run_float(log, model).probability
+    np.testing.assert_array_equal(np.isnan(quantised), np.isnan(in_float))
+    windows, ends = feature_windows(flight_features(log).fused, 100, model.scale)
+    logits = infer_float(model.float_layers, windows).astype(float)
+    of_window = dict(zip(ends, 1 / (1 + np.exp(logits[:, 0] - logits[:, 1])), strict=True))
+    first = int(np.flatnonzero(np.isfinite(quantised))[0])
+    answers = np.arange(first, len(log) - 2, 4)
+    np.testing.assert_allclose(in_float[answers], [of_window[i + 2] for i in answers], rtol=1e-6)
+    assert all(np.ptp(in_float[i:i + 4]) == 0.0 for i in answers)
 
 
 def test_the_scale_belongs_to_the_file_and_to_the_digest(model, tmp_path: Path):

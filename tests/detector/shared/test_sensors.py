@@ -6,14 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import airtouch
 from airtouch import logs
+from airtouch.crazyflie import replay
 from airtouch.detector import best
 from airtouch.detector.best import batches, sensor_note
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
-from airtouch.logs.flight_log import GYRO, PWM
+from airtouch.logs.flight_log import GYRO, PWM, FlightLog
 from made_flight import SMALL, made_flight
 
 
@@ -71,6 +73,30 @@ def test_the_rates_alone_tell_flight_from_ground(flights):
         airborne = sensors.is_flying(log.stack(GYRO))
         assert not airborne[:max(air[0] - 30, 0)].any(), path
         assert airborne[air[0] + 100:air[-1]].mean() > 0.999, path
+
+
+def test_a_log_without_motors_and_down_range_is_scored_where_its_rates_show_flight(flights):
+    """Against the seconds in which the motors ran; there is no truth, so edges are neither missed nor false."""
+    path = sorted((flights / "airtouch").glob("*_h8*.csv.gz"))[0]
+    whole = logs.read(path)
+    deaf = sensors.without(whole, ("motors",))
+    log = FlightLog({name: x for name, x in deaf.columns.items() if name not in ("zrange_m", "z_m")}, deaf.meta)
+    result = airtouch.evaluate([log])["per_flight"][0]
+    assert result["airborne_s"] == pytest.approx(logs.airborne(whole).sum() * 0.01, rel=0.03)
+    assert replay.position(FlightLog({n: x for n, x in log.columns.items() if n not in ("x_m", "y_m")}, log.meta),
+                           0.3)["x_m"][-1] == pytest.approx(0.3 * result["airborne_s"])
+    rng = np.random.default_rng(0)
+    parked = log.with_columns({n: rng.normal(x[0], 1e-4, len(x)) for n, x in log.columns.items() if n != "t_s"})
+    with pytest.raises(AirTouchError, match="no flight in this log.* rates"):
+        evaluate.check(parked, 1)
+
+
+def test_a_stuck_sensor_with_a_lost_sample_is_still_stuck():
+    log = made_flight(4)
+    stuck = np.full(len(log), 0.25)
+    stuck[[700, 1300]] = np.nan
+    with pytest.raises(AirTouchError, match="gyro y is constant"):
+        evaluate.check(log.with_columns({"gyro_y_radps": stuck}))
 
 
 def test_flight_is_told_causally():

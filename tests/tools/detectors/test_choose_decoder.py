@@ -1,13 +1,15 @@
 """The choice of the decoder's settings, on synthetic detections whose delays, misses and false edges are known."""
 
 import sys
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from airtouch.detector.best.recipe import ROW_STRIDE
+from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import TOLERANCE_S
+from airtouch.detector.evaluation.summary import summarise
 from airtouch.errors import AirTouchError
 from airtouch.logs.edges import Edge
 from airtouch.parameters import SAMPLE_PERIOD_S
@@ -19,9 +21,10 @@ STEPS = 1000
 PROMPT, LATE, BLIND = (np.array([0.1, 0.1]), 0), (np.array([0.1, 0.5]), 0), (np.array([]), 3)
 
 
-def flight(edges=(200, 600), fold=0, speed=0.3, minutes=0.5):
+def flight(edges=(200, 600), fold=0, speed=0.3, minutes=0.5, name=None):
     """A flight with true edges at these samples."""
-    return tool.HeldOutFlight(SimpleNamespace(path=None, condition=None), fold, speed,
+    file = FlightFile(Path(name or f"{fold}.csv"), Condition(speed_mps=speed))
+    return tool.HeldOutFlight(file, fold, speed,
                               [Edge(sample, "entry", 0.0, 0.0) for sample in edges], np.ones(STEPS, bool),
                               np.zeros(STEPS), np.zeros((STEPS, 3)), np.ones(STEPS, bool), minutes)
 
@@ -66,6 +69,26 @@ def test_a_fold_is_scored_with_settings_that_its_own_flights_did_not_choose():
     results = [[PROMPT, BLIND], [BLIND, LATE]]
     assert tool.choices(flights, results) == {0: (1, pytest.approx(0.3)), 1: (0, pytest.approx(0.1))}
     assert tool.cheapest(flights, [*results, [PROMPT, PROMPT]]) == 2
+
+
+def test_a_flight_of_several_folders_counts_once_with_the_settings_of_its_fold(detected_at):
+    """Three folders are not three times the flights: as many edges, and an interval as wide as that of the flights."""
+    detected_at(210, 610)
+    once = [flight(fold=0), flight(fold=1)]
+    settings = tool.candidates(2, np.random.default_rng(0), 5)
+    scores, by_fold = tool.nested(once * 3, settings, [[PROMPT, BLIND] * 3, [BLIND, LATE] * 3])
+    assert [score.flight for score in scores] == ["0.csv", "1.csv"]
+    assert [len(score.edges) for score in scores] == [6, 6]
+    assert by_fold["0"]["lag_s"] == pytest.approx(0.3) and by_fold["1"]["lag_s"] == pytest.approx(0.1)
+    assert by_fold["0"]["entry_score"] == settings[1].entry_score
+    alone = tool.nested(once, settings, [[PROMPT, BLIND], [BLIND, LATE]])[0]
+    ours, theirs = (summarise(some)["intervals"]["mean_abs_error_s"] for some in (scores, alone))
+    assert ours == pytest.approx(theirs) and ours[1] > ours[0]
+
+
+def test_a_flight_does_not_choose_its_own_settings_by_another_folders_fold():
+    with pytest.raises(AirTouchError, match="a.csv: in fold 0 of one folder and in 0126 of another"):
+        tool.choices([flight(fold=0, name="a.csv"), flight(fold="0126", name="a.csv")], [[PROMPT, PROMPT]])
 
 
 def test_settings_are_drawn_from_their_ranges_and_hold_as_told():

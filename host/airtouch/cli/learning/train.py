@@ -11,6 +11,7 @@ from typing import Any
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
+from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import need_flights
 from airtouch.cli.shared.help import examples
 from airtouch.cli.shared.options import Finite, seed_option
@@ -24,6 +25,7 @@ from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
+from airtouch.vehicle import DEFAULT_VEHICLE
 
 
 @click.command(name="train", epilog=examples(
@@ -43,6 +45,8 @@ from airtouch.logs.flight_log import FlightLog
               help="best: train on K of the flights only, drawn by --seed.")
 @click.option("--silence", multiple=True, type=click.Choice(sensors.SENSORS),
               help="best: remove this sensor from the flights, for logs that lack it.")
+@click.option("--vehicle", metavar="NAME", help="best: the vehicle whose thrust curve the network is trained for, a "
+              f"name or a .toml file; {DEFAULT_VEHICLE} if left out. --simulated flies it, too.")
 @click.option("--free-air", multiple=True, type=click.Path(path_type=Path, file_okay=False),
               help="best: also train on the flights of this folder, which have no edges. May be repeated.")
 @click.option("--sparsity", type=Finite(0, 1, max_open=True),
@@ -58,7 +62,7 @@ from airtouch.logs.flight_log import FlightLog
 @click.option("--force", is_flag=True, help="Replace the model file.")
 def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | None, steps: int | None,
             start: Path | None, labelled: int | None, silence: tuple[str, ...],
-            free_air: tuple[Path, ...], sparsity: float | None,
+            vehicle: str | None, free_air: tuple[Path, ...], sparsity: float | None,
             block: str | None, df_lambda: float | None, simulated: int | None,
             scenario: str | None, without: tuple[str, ...], seed: int, force: bool) -> None:
     """Train on FLIGHTS: logs, or folders (the clean flights of its manifest.csv, else all).
@@ -68,7 +72,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     early and to choose its thresholds. `best` trains on all flights; its state is stored beside --out, in a folder
     that ends in .training, and the same command continues after a stop.
     """
-    _check_combination(flights, detector, simulated, scenario, without, (start, labelled, free_air, silence),
+    _check_combination(flights, detector, simulated, scenario, without, (start, labelled, free_air, silence, vehicle),
                        steps, (epochs, block, df_lambda))
     need("train", "training")
     check_free(out, force)
@@ -81,6 +85,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     what: dict[str, Any] | None = None
     if start:
         options["start"] = module.load(start)
+    if vehicle:
+        options["vehicle"] = vehicles.load(vehicle)
     if free_air:
         options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
     began = time.monotonic()
@@ -92,7 +98,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
                    "repeated")
     with _progress_bars() as progress:
         if simulated:
-            training, what = _simulate(simulated, scenario, without, seed, progress)
+            training, what = _simulate(simulated, scenario, without, options.get("vehicle"), seed, progress)
             failures = 0
         if detector == "best":
             options["work"] = checkpoints
@@ -122,7 +128,7 @@ def _check_combination(flights: tuple[Path, ...], detector: str, simulated: int 
     if not simulated and (scenario or without):
         raise click.UsageError("--scenario and --without need --simulated N")
     if detector != "best" and any(of_best):
-        raise click.UsageError("--start, --labelled, --silence and --free-air are for --detector best")
+        raise click.UsageError("--start, --labelled, --silence, --vehicle and --free-air are for --detector best")
     if detector != "best" and steps is not None:
         raise click.UsageError("--steps is for --detector best; paper takes --epochs")
     if detector == "best" and any(value is not None for value in of_paper):
@@ -155,13 +161,13 @@ def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
     return training, failures
 
 
-def _simulate(count: int, scenario: str | None, without: tuple[str, ...], seed: int,
-              progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
+def _simulate(count: int, scenario: str | None, without: tuple[str, ...], vehicle: vehicles.Vehicle | None,
+              seed: int, progress: Callable[[str, int, int, str], None]) -> tuple[list[FlightLog], dict[str, Any]]:
     """Simulated flights and their description for the model's metadata."""
     from airtouch.detector.evaluation.data import simulated
 
-    return simulated.training_flights(count, scenario or simulated.SCENARIO, without=without, seed=seed,
-                                      progress=progress)
+    return simulated.training_flights(count, scenario or simulated.SCENARIO, vehicle=vehicle, without=without,
+                                      seed=seed, progress=progress)
 
 
 def _report(metadata: dict, seconds: float) -> None:

@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import click
+
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import MANIFEST, flights_in, ignored
 

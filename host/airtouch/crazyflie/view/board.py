@@ -83,7 +83,10 @@ class Board:
         self.now_s = float(times_s[-1])
         self.latest = {name: float(values[-1]) for name, values in columns.items()}
         for name, (make, *_) in SIGNALS.items():
-            values = probability if make is None else make(columns)
+            try:
+                values = probability if make is None else make(columns)
+            except KeyError:  # a sensor that the log lacks
+                values = None
             self._signals[name].extend(np.full(len(times_s), np.nan) if values is None else values)
         if "x_m" in columns:
             self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)

@@ -7,7 +7,7 @@ recipe        every number of the network's shape and training; its graph, as a 
 operations    what each operation of the graph is in NumPy, Keras, TensorFlow and int8
 network       the graph in NumPy, Keras and TensorFlow
 outputs       what each logit says and is trained to say
-batches       flights as channels and goals; crops of them, augmented
+batches       flights as channels and targets; crops of them, augmented
 training      long crops, one cycle of the learning rate, pruning on the way
 quantisation  float weights to int8
 model         the model file

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airtouch import kernels, logs
-from airtouch.detector.best.outputs import OUTPUTS, goals
+from airtouch.detector.best.outputs import OUTPUTS, training_targets
 from airtouch.detector.best.recipe import CHANNELS, ROW_STRIDE, Recipe
 from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.shared import sensors
@@ -16,19 +16,22 @@ from airtouch.reference.motion_channels import CHANNEL_TABLE, NAMES, MotionConfi
 #: Sign of each column in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
 MIRROR = np.array([*(channel.mirror for channel in CHANNEL_TABLE), 1], dtype=np.float32)
 FORWARD, LEFT, EMPTY = (NAMES.index(name) for name in ("ax", "ay", "zero"))
-AHEAD, BEHIND = 300, 150  #: samples before take-off where a crop may start, and after the last one where it may end
+#: samples before take-off at which the first of the crops that lie anywhere begins; one of take-off begins up to
+#: BEHIND before that
+AHEAD = 300
+BEHIND = 150  #: samples after the last one of the flight up to which a crop of landing may end
 
 
 @dataclass(frozen=True)
 class TrainingFlight:
     """One training flight of n samples.
 
-    x: (n, channels). goals: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
+    x: (n, channels). targets: (n, outputs). edges: (k,) samples. airborne: (n,) bool. weight: how often it is drawn
     against the others. silent: channels of sensors that it lacks, which stay exactly 0.
     """
 
     x: np.ndarray
-    goals: np.ndarray
+    targets: np.ndarray
     edges: np.ndarray
     airborne: np.ndarray
     weight: float = 1.0
@@ -54,14 +57,14 @@ def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None 
     edges = logs.true_edges(log) if edges is None else edges
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
     silent = {channel for sensor in sensors.missing_sensors(log) for channel in sensors.CHANNELS_OF[sensor]}
-    return TrainingFlight(x, goals(over_platform(edges, len(log)), edges, recipe),
+    return TrainingFlight(x, training_targets(over_platform(edges, len(log)), edges, recipe),
                           np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
                           tuple(sorted(silent)))
 
 
 def batch(flights: Sequence[TrainingFlight], recipe: Recipe, rng: np.random.Generator,
           free_air: Sequence[TrainingFlight] = ()) -> tuple[np.ndarray, np.ndarray]:
-    """Inputs (batch, crop, channels) and goals (batch, crop / stride, outputs), float32.
+    """Inputs (batch, crop, channels) and targets (batch, crop / stride, outputs), float32.
 
     free_air: flights without edges, the source of `recipe.free_air_share` of the crops.
     """
@@ -104,7 +107,7 @@ def _crop(flight: TrainingFlight, recipe: Recipe, rng: np.random.Generator) -> t
     low = np.minimum(t.astype(int), last - 1)
     part = (t - low)[:, None].astype(np.float32)
     x = flight.x[low] * (1 - part) + flight.x[low + 1] * part
-    return x, flight.goals[np.round(t[::ROW_STRIDE]).astype(int)]
+    return x, flight.targets[np.round(t[::ROW_STRIDE]).astype(int)]
 
 
 def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.random.Generator) -> float:
@@ -118,7 +121,8 @@ def crop_start(flight: TrainingFlight, recipe: Recipe, speed: float, rng: np.ran
     if len(flight.edges) and rng.random() < recipe.edge_share:
         ahead = rng.uniform(1.1 * recipe.warm_up, 0.93 * recipe.crop) * speed
         return float(flight.edges[rng.integers(len(flight.edges))]) - ahead
-    # conditional on not being an edge crop, so that `phases` is a share of all crops
+    # conditional on not being an edge crop, so that `phases` is a share of all crops of a flight with edges; of a
+    # flight without edges every crop comes here, and the share is phases / (1 - edge_share)
     if rng.random() < recipe.phases / max(1.0 - recipe.edge_share, recipe.phases):
         return first - BEHIND * rng.random() if rng.random() < 0.5 else final + BEHIND * rng.random()
     return rng.uniform(min(first, final), max(first, final))

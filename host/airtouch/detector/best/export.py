@@ -5,7 +5,7 @@ import numpy as np
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.detector.shared.c_source import CONST, CONST_DEFAULT, float_literal, golden_header, golden_source, layer
-from airtouch.detector.shared.vehicle_header import thrust_text
+from airtouch.detector.shared.vehicle_header import name_of, thrust_text
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.reference.motion_channels import MotionConfig
@@ -51,7 +51,7 @@ def _header(model: BestModel) -> str:
 
 #define AIRTOUCH_STREAM_SHA256 "{model.digest}"
 #define AIRTOUCH_STREAM_ARENA_BYTES {arena_bytes(network)}  // what streamInt8ArenaBytes says
-#define AIRTOUCH_STREAM_VEHICLE "{motion.vehicle.name}"  // it was trained for
+#define AIRTOUCH_STREAM_VEHICLE "{name_of(motion.vehicle)}"  // it was trained for
 #define AIRTOUCH_STREAM_THRUST "{thrust_text(motion.vehicle, motion.arm_pwm)}"
 #define AIRTOUCH_STREAM_ENTRY_SCORE {float_literal(decoder.entry_score)}  // airtouchStreamDecoder.entryScore
 #define AIRTOUCH_STREAM_EXIT_SCORE {float_literal(decoder.exit_score)}

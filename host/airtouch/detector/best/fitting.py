@@ -49,8 +49,8 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
                            free_air=[flight_of(log, recipe, ()) for log in settings.free_air],
                            start=start.weights if start else None,
                            resume=_resume_file(examples, recipe, settings, seed))
-    int8, tflite = quantisation.quantise(weights, recipe,
-                                         quantisation.windows([f.x for f in training_flights], recipe))
+    int8, tflite = quantisation.quantise_network(weights, recipe,
+                                                 quantisation.windows([f.x for f in training_flights], recipe))
     model = BestModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": settings.command, "seed": seed, "lag_s": 0.0,
         "sigma_s": detector.TIMING_SIGMA_S, **_decoders(settings.decoder, start),
@@ -77,10 +77,14 @@ def pseudo_labels(flights: Sequence[FlightLog], model: BestModel) -> list[list[l
 
     Their heights are NaN, for they are not known.
     """
-    lag = round(detector.lag_s(model) / SAMPLE_PERIOD_S)
-    return [None if evaluate.truth(log) is not None else
-            [logs.Edge(max(edge.sample - lag, 0), edge.kind, np.nan, np.nan) for edge in detector.run(log, model).edges]
+    return [None if evaluate.truth(log) is not None else _detected(log, detector.model_for(model, log))
             for log in flights]
+
+
+def _detected(log: FlightLog, model: BestModel) -> list[logs.Edge]:
+    """The edges that the model which serves the log detects, less that model's lag."""
+    lag = round(detector.lag_s(model) / SAMPLE_PERIOD_S)
+    return [logs.Edge(max(edge.sample - lag, 0), edge.kind, np.nan, np.nan) for edge in detector.run(log, model).edges]
 
 
 def _training_flights(examples: Examples, recipe: Recipe, report: Progress) -> list[TrainingFlight]:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from airtouch import vehicle as vehicles
 from airtouch.detector.best.network import weight_shapes
 from airtouch.detector.best.quantisation import network_of
 from airtouch.detector.best.recipe import CHANNELS, Recipe
@@ -23,6 +24,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.reference.edge_decoder import DecoderConfig
 from airtouch.reference.networks.stream_int8 import StreamNetwork
+from airtouch.vehicle import Vehicle
 
 FORMAT = 1  #: version of the file's layout
 SHIPPED = "best.npz"
@@ -100,7 +102,10 @@ class BestModel:
     def to_bytes(self) -> bytes:
         """The file's content; the same model gives the same bytes."""
         arrays = {**self.weights, **self._int8_arrays(), "tflite": np.frombuffer(self.tflite, dtype=np.uint8)}
-        return archive.to_bytes(arrays, {**KIND, "recipe": asdict(self.recipe), **self.metadata})
+        recipe = asdict(self.recipe)
+        if self.recipe.vehicle is None:
+            del recipe["vehicle"]  # so that a file is as it was before there was a choice
+        return archive.to_bytes(arrays, {**KIND, "recipe": recipe, **self.metadata})
 
     def c_sources(self) -> dict[str, str]:
         """File name -> text of its C sources, without the lines that say where they came from."""
@@ -180,7 +185,7 @@ def _recipe(table: Any, source: str) -> Recipe:
                           f"{archive.REMEDY}")
     try:
         recipe = Recipe(**{**_BEFORE, **table, "dilations": tuple(table["dilations"]),
-                            "muted": tuple(table["muted"])})
+                           "muted": tuple(table["muted"]), "vehicle": _vehicle(table.get("vehicle"), source)})
         numbers = [recipe.width, recipe.first_taps, recipe.taps, *recipe.dilations, *recipe.muted]
     except (KeyError, TypeError):
         raise wrong from None
@@ -192,6 +197,15 @@ def _recipe(table: Any, source: str) -> Recipe:
     if not all(low <= getattr(recipe, name) <= high for name, (low, high) in _LIMITS.items()) or recipe.width % 4:
         raise wrong
     return recipe
+
+
+def _vehicle(table: Any, source: str) -> Vehicle | None:
+    """The vehicle in a recipe; AirTouchError, and TypeError where a field is missing, for anything else."""
+    if table is None:
+        return None
+    if not isinstance(table, dict):
+        raise AirTouchError(f"{source}: vehicle is not a table; {archive.REMEDY}")
+    return Vehicle(**vehicles.numbers({name: value for name, value in table.items() if value is not None}, source))
 
 
 def _check_metadata(model: BestModel, source: str) -> None:

@@ -15,7 +15,7 @@ from airtouch.reference.networks.stream_graph import StreamLayer, taps_of
 if TYPE_CHECKING:
     import keras
 
-CONV = "conv"  #: causal convolution: row t reads rows t, t - dilation, t - 2 dilation, ... of the layer before
+CAUSAL_CONV = "conv"  #: causal convolution: row t reads rows t, t - dilation, t - 2 dilation, ... of the layer before
 HEAD = "head"  #: dense layer: row t reads row t of several layers
 
 
@@ -71,5 +71,5 @@ def _head_window(layer: StreamLayer, kernel: np.ndarray, bias: np.ndarray, x: An
 
 
 #: operation of a `StreamLayer` -> what it is
-OPERATIONS = {CONV: Operation(DENSE, lambda layer: layer.shape, _conv_rows, _conv_keras, _conv_window),
+OPERATIONS = {CAUSAL_CONV: Operation(DENSE, lambda layer: layer.shape, _conv_rows, _conv_keras, _conv_window),
               HEAD: Operation(DENSE, lambda layer: layer.shape, _head_rows, _head_keras, _head_window)}

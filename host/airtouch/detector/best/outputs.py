@@ -22,32 +22,32 @@ class Output:
     """One logit.
 
     name: one that the decoder reads has its name in `reference.edge_decoder.LOGITS`. start_bias: its bias before
-    training. weight(recipe): its share of the loss. goal(over, edges, recipe): what it is to say at each sample,
+    training. weight(recipe): its share of the loss. target(over, edges, recipe): what it is to say at each sample,
     (n,) float32 in 0..1, for over (n,), 0 or 1, and the flight's edges.
     """
 
     name: str
     start_bias: float
     weight: Callable[["Recipe"], float]
-    goal: Callable[[np.ndarray, Sequence[logs.Edge], "Recipe"], np.ndarray]
+    target: Callable[[np.ndarray, Sequence[logs.Edge], "Recipe"], np.ndarray]
 
 
 def _over(over: np.ndarray, edges: Sequence[logs.Edge], recipe: "Recipe") -> np.ndarray:
     """Over a platform, `over_delay` samples late."""
-    goal = np.zeros(len(over), np.float32)
-    goal[recipe.over_delay:] = over[:len(over) - recipe.over_delay]
-    return goal
+    target = np.zeros(len(over), np.float32)
+    target[recipe.over_delay:] = over[:len(over) - recipe.over_delay]
+    return target
 
 
 def _event(kind: str) -> Callable[[np.ndarray, Sequence[logs.Edge], "Recipe"], np.ndarray]:
     """Edges of this kind: bumps of height 1, `delay` samples after their edge."""
     def bumps(over: np.ndarray, edges: Sequence[logs.Edge], recipe: "Recipe") -> np.ndarray:
-        goal, t = np.zeros(len(over), np.float32), np.arange(len(over))
+        target, t = np.zeros(len(over), np.float32), np.arange(len(over))
         for edge in edges:
             if edge.kind == kind:
                 bump = np.exp(-0.5 * np.square((t - edge.sample - recipe.delay) / recipe.event_sigma))
-                goal = np.maximum(goal, bump.astype(np.float32))
-        return goal
+                target = np.maximum(target, bump.astype(np.float32))
+        return target
     return bumps
 
 
@@ -58,9 +58,9 @@ OUTPUTS = (
 )
 
 
-def goals(over: np.ndarray, edges: Sequence[logs.Edge], recipe: "Recipe") -> np.ndarray:
+def training_targets(over: np.ndarray, edges: Sequence[logs.Edge], recipe: "Recipe") -> np.ndarray:
     """What the logits are to say at each sample, (n, outputs) float32 in 0..1.
 
     over: (n,), 0 or 1, whether the drone is over a platform. edges: those of the flight.
     """
-    return np.column_stack([output.goal(over, edges, recipe) for output in OUTPUTS])
+    return np.column_stack([output.target(over, edges, recipe) for output in OUTPUTS])

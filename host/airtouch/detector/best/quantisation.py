@@ -34,7 +34,7 @@ def windows(flights: Sequence[np.ndarray], recipe: Recipe, count: int = REPRESEN
     return np.stack([windows[i * len(windows) // count] for i in range(min(count, len(windows)))]).astype(np.float32)
 
 
-def quantise(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:
+def quantise_network(weights: Weights, recipe: Recipe, representative: np.ndarray) -> tuple[StreamNetwork, bytes]:
     """The int8 network, and a TFLite file that computes the last row of a window with the same bits.
 
     representative: windows (n, receptive samples, channels). Weights symmetric, one scale an output channel.

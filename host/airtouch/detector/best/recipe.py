@@ -3,10 +3,11 @@
 import math
 from dataclasses import dataclass, replace
 
-from airtouch.detector.best.operations import CONV, HEAD
+from airtouch.detector.best.operations import CAUSAL_CONV, HEAD
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
+from airtouch.vehicle import Vehicle
 
 CHANNELS = len(NAMES)  #: values a sample
 ROW_STRIDE = 2  #: samples between two rows that are computed: 50 Hz
@@ -34,10 +35,10 @@ class Recipe:
     warm_up: int = 256  #: samples at the start of a crop that have no part in the loss
     peak_rate: float = 4e-3  #: learning rate at the top of the one cycle
     weight_decay: float = 1e-4  #: of AdamW
-    # Goals (outputs.py)
-    delay: int = 10  #: samples from an edge to the peak of its event's goal
-    over_delay: int = 4  #: samples from an edge to the change of the goal of "over"
-    event_sigma: float = 6.0  #: width of an event's goal, samples
+    # Training targets (outputs.py)
+    delay: int = 10  #: samples from an edge to the peak of its event's target
+    over_delay: int = 4  #: samples from an edge to the change of the target of "over"
+    event_sigma: float = 6.0  #: width of an event's target, samples
     event_weight: float = 3.0  #: weight of an event's loss against that of "over"
     muted: tuple[int, ...] = ()  #: channels that are always 0, for ablations
     # Choice of crops (batches.py)
@@ -54,16 +55,20 @@ class Recipe:
     silent_acceleration: float = 0.15  #: share of the crops without acceleration, so that the network runs without it
     silent_rates: float = 0.05  #: share of the crops without rates
     silent_motors: float = 0.1  #: share of the crops without motors
-    phases: float = 0.15  #: share of the crops that hold take-off or landing
+    #: share of the crops of flights with edges that are drawn at take-off or landing; of flights without edges, divided
+    #: by 1 - edge_share
+    phases: float = 0.15
     free_air_share: float = 0.2  #: share of the crops from flights without edges, where there are such
+    #: its thrust curve, gravity and PWM in the air are those of the motion channels; None for the default vehicle's
+    vehicle: Vehicle | None = None
 
     @property
     def graph(self) -> tuple[StreamLayer, ...]:
         """The network: a strided convolution, dilated ones, and a head that reads a row of each of those."""
         width, dilated = self.width, range(1, 1 + len(self.dilations))
         return (
-            StreamLayer("layer0", CONV, self.first_taps, CHANNELS, width, stride=ROW_STRIDE),
-            *(StreamLayer(f"layer{i}", CONV, self.taps, width, width, dilation, pruned=True)
+            StreamLayer("layer0", CAUSAL_CONV, self.first_taps, CHANNELS, width, stride=ROW_STRIDE),
+            *(StreamLayer(f"layer{i}", CAUSAL_CONV, self.taps, width, width, dilation, pruned=True)
               for i, dilation in zip(dilated, self.dilations, strict=True)),
             StreamLayer(f"layer{len(dilated) + 1}", HEAD, len(dilated), width, len(OUTPUTS), relu=False,
                         reads=tuple(dilated)),
@@ -78,5 +83,7 @@ class Recipe:
     def motion(self) -> MotionConfig:
         """The channels' settings: a muted channel has no bounds to its nominal amplitude."""
         config = MotionConfig()
+        if self.vehicle is not None:
+            config = replace(config, vehicle=self.vehicle, arm_pwm=self.vehicle.arm_pwm)
         scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
         return replace(config, scale=scale)

@@ -19,7 +19,7 @@ from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import flies_below
-from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S
+from airtouch.parameters import SAMPLE_PERIOD_S
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
 MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
@@ -77,13 +77,12 @@ def check(log: FlightLog, spare: int = 0) -> None:
         if missing > MOST_MISSING:
             raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
                                 "log the flight again or leave it out")
-    flying = logs.airborne(log)
+    flying, evidence = sensors.airborne_by(log)
     if flies_below(log) or np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:  # the detectors go by the motors alone
-        raise AirTouchError(f"{log.source}: no flight in this log (mean PWM above {DEFAULT.arm_pwm:g} for less than "
-                            "1 s)")
+        raise AirTouchError(f"{log.source}: no flight in this log (less than 1 s of {evidence})")
     used = np.where(finite, channels, 0.0)[flying]
-    for name, spread in zip(names, np.ptp(used, axis=0), strict=True):
-        if spread == 0.0:
+    for name, values, logged in zip(names, used.T, finite[flying].T, strict=True):
+        if not logged.any() or np.ptp(values[logged]) == 0.0:
             raise AirTouchError(f"{log.source}: {name} is constant in flight; the sensor or the log is stuck")
     for rate, acceleration in zip(RATES, ACCELERATIONS, strict=True):
         if {rate, acceleration} <= set(names):
@@ -115,7 +114,7 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
 def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
     """The score of a trace that the detector gave with this model."""
     condition = with_flown_speed(file, log).condition
-    score = score_flight(file.path.name, condition, truth(log), logs.airborne(log), trace,
+    score = score_flight(file.path.name, condition, truth(log), sensors.airborne_by(log)[0], trace,
                          detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)

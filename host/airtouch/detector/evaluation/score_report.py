@@ -97,7 +97,8 @@ def shown_flights(results: Mapping[str, Sequence[evaluate.Result]], most: int) -
     """At most `most` flights of the first detector, from its best to its worst, with the other detectors' traces."""
     first, *others = results
     ranked = sorted(results[first], key=_badness)
-    chosen = [ranked[i * (len(ranked) - 1) // max(most - 1, 1)] for i in range(min(most, len(ranked)))]
+    count = min(most, len(ranked))
+    chosen = [ranked[i * (len(ranked) - 1) // max(count - 1, 1)] for i in range(count)]
     traces = {name: {r.score.flight: r.trace for r in results[name]} for name in others}
     return [ShownFlight(r.log, r.trace, evaluate.truth(r.log), r.score,
                         {name: of[r.score.flight] for name, of in traces.items() if r.score.flight in of})

@@ -25,17 +25,23 @@ from airtouch.detector.paper.model import Model
 from airtouch.detector.shared import training_set
 from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError, printable
-from airtouch.kernels.network import arena_bytes, infer_float, parameter_bytes, probability_of_flight
-from airtouch.kernels.rolling import probability_of_samples
+from airtouch.kernels.network import (
+    arena_bytes,
+    infer_float,
+    parameter_bytes,
+    platform_probability,
+    probability_of_flight,
+)
+from airtouch.kernels.rolling import answers_of_samples, held, probability_of_samples, rolling_size
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 from airtouch.reference.networks.int8_network import multiplications
 
 #: The grid of decoding settings that `tune` searches. The paper gives none, so it is chosen from the training flights.
-ENTRY = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  #: P(over a platform) at which an entry is reported
-EXIT = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)  #: P(over a platform) at which an exit is reported
-DWELL = (25, 50, 100, 150)  #: samples (10 ms) between two edges, at least
-HOLD = (25, 50, 100, 200)  #: samples for which an alert of FR-CFAR confirms an edge
+ENTRY_GRID = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)  #: P(over a platform) at which an entry is reported
+EXIT_GRID = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)  #: P(over a platform) at which an exit is reported
+DWELL_GRID = (25, 50, 100, 150)  #: samples (10 ms) between two edges, at least
+HOLD_GRID = (25, 50, 100, 200)  #: samples for which an alert of FR-CFAR confirms an edge
 #: One flight: P(over a platform), whether edges may be reported, alert of FR-CFAR; (n,) each.
 DecodingInputs = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -69,11 +75,29 @@ def run_float(log: FlightLog, model: Model | None = None) -> Trace:
     """The trace of `run` by the float network, before quantisation; the difference is the cost of quantisation."""
     model = model or load(None)
     features = flight_features(log, parameters=decoding_settings(model)[0])
-    windows, ends = feature_windows(features.fused, DEFAULT.feature_window, model.scale)
-    logits = infer_float(model.float_layers, windows).astype(np.float64)
-    probability = np.full(len(log), np.nan)
-    probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
-    return _trace(log, model, features, probability)
+    return _trace(log, model, features, _float_probability(model, features.fused))
+
+
+def _float_probability(model: Model, fused: np.ndarray) -> np.ndarray:
+    """`probability_of` by the float network, at the samples at which the int8 network answers."""
+    probability = np.full(len(fused), np.nan)
+    if model.scale is None:
+        windows, at = feature_windows(fused, DEFAULT.feature_window)
+    else:
+        valid = answers_of_samples(model, fused, stride(model))[1]
+        windows, at = _rolling_windows(model, model.scale.apply(fused), np.flatnonzero(valid))
+    probability[at] = platform_probability(infer_float(model.float_layers, windows), 1.0)
+    return probability if model.scale is None else held(probability, valid, fused)
+
+
+def _rolling_windows(model: Model, inputs: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The windows (k, rows, c) whose answers a rolling network gives at the samples (k,) of (n, c), and these samples.
+
+    A window ends some samples later, of which the answer does not depend: they are as the last one before them.
+    """
+    ahead = rolling_size(model.int8, stride(model)).ahead
+    rows = np.minimum(at[:, None] + ahead + np.arange(1 - DEFAULT.feature_window, 1), at[:, None])
+    return inputs[rows], at
 
 
 def _trace(log: FlightLog, model: Model, features: Features, probability: np.ndarray) -> Trace:
@@ -147,7 +171,8 @@ def candidates(physical_filter: bool) -> list[Parameters]:
     """The decoding settings that tuning chooses from."""
     return [
         replace(DEFAULT, probability_entry=entry, probability_exit=leave, dwell_samples=dwell, alert_hold=hold)
-        for entry, leave, dwell, hold in itertools.product(ENTRY, EXIT, DWELL, HOLD if physical_filter else HOLD[:1])
+        for entry, leave, dwell, hold in itertools.product(
+            ENTRY_GRID, EXIT_GRID, DWELL_GRID, HOLD_GRID if physical_filter else HOLD_GRID[:1])
         if leave < entry
     ]
 

@@ -1,6 +1,6 @@
 """The features of the paper's detector: nine channels to fused features, disturbance force and FR-CFAR."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -44,13 +44,15 @@ def pipeline(log: FlightLog, parameters: Parameters = DEFAULT, probability: np.n
     """Features, force, alerts and edges of one flight of n samples, by the C pipeline.
 
     probability: (n,) P(over a platform) by the network; None before it ran, and then without edges.
-    vehicle: mass and thrust curve for the disturbance force; for None the one that the log
-    names (`vehicle.of_log`).
+    vehicle: mass and thrust curve for the disturbance force, and the PWM above which it is in the air, which is not
+    taken from `parameters`; for None the one that the log names (`vehicle.of_log`).
     physical_filter: drop edges without an FR-CFAR alert.
     Raises AirTouchError that names the columns which the log lacks.
     """
+    vehicle = vehicle or vehicles.of_log(log.meta)[0]
+    parameters = replace(parameters, arm_pwm=vehicle.arm_pwm)
     return kernels.edge_pipeline(
-        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle or vehicles.of_log(log.meta)[0],
+        level_acceleration(log), log.stack(GYRO), log.stack(PWM), vehicle,
         vbat_v=log["vbat_V"] if log.has("vbat_V") else None, thrust_axis=thrust_axis(log),
         probability=probability, config=EdgePipelineConfig(parameters, physical_filter=physical_filter))
 

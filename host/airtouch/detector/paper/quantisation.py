@@ -10,7 +10,7 @@ from airtouch.reference.networks.int8_network import Int8Layer, Int8Network
 REPRESENTATIVE = 500  #: windows that set the range of each activation
 
 
-def quantise(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]:
+def quantise_network(weights: Weights, windows: np.ndarray) -> tuple[Int8Network, bytes]:
     """The int8 network and the TFLite file of it.
 
     weights: float32 (`network.weight_shapes`). windows: (n, 100, 3) normalised; REPRESENTATIVE
@@ -37,7 +37,7 @@ def _tflite(weights: Weights, windows: np.ndarray) -> bytes:
 
 
 def read_tflite(content: bytes) -> Int8Network:
-    """The paper's int8 network out of a TFLite file that `quantise` made."""
+    """The paper's int8 network out of a TFLite file that `quantise_network` made."""
     layers = read_weighted_layers(content)
     arrays: dict[str, np.ndarray] = {}
     for name, layer in zip(WEIGHTED, layers, strict=True):

@@ -34,7 +34,7 @@ def run(log: FlightLog, model: Model | None = None) -> Trace:
 
 
 def run_float(log: FlightLog, model: Model | None = None) -> Trace:
-    """As `run`, with the float network as trained, over windows: what quantisation is measured against."""
+    """As `run`, with the float network as trained, over the windows of the same answers: quantisation apart."""
     return paper.run_float(log, model or load(None))
 
 

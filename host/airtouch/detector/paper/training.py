@@ -86,7 +86,7 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
         raise AirTouchError("training: the flights hold no windows both over and beside a platform; "
                             "give more flights")
     weights, epochs_run = fit_windows(windows.select(in_training), windows.select(~in_training), recipe, report)
-    int8, tflite = quantisation.quantise(weights, windows.x[in_training])
+    int8, tflite = quantisation.quantise_network(weights, windows.x[in_training])
     hashes = [training_set.flight_hash(log) for log in flights]
     model = Model(weights, int8, tflite, {
         "detector": "paper", "version": __version__, "command": command, "parameters": asdict(DEFAULT),

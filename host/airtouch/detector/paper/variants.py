@@ -18,7 +18,7 @@ from airtouch.detector.paper.recipe import EPOCHS, PaperRecipe
 from airtouch.detector.shared.tensorflow import use_tensorflow
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
-from airtouch.kernels.network import infer_float
+from airtouch.kernels.network import infer_float, platform_probability
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
 
@@ -91,7 +91,7 @@ class Variant:
         x, ends = feature_windows(features.fused, self.rows)
         logits = np.asarray(model.network.predict(x[..., None], batch_size=2048, verbose=0), dtype=np.float64)
         probability = np.full(len(log), np.nan)
-        probability[ends] = 1.0 / (1.0 + np.exp(logits[:, 0] - logits[:, 1]))
+        probability[ends] = platform_probability(logits, 1.0)
         return probability, features.armed, features.alert
 
 

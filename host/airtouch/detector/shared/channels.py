@@ -8,7 +8,7 @@ from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, Flight
 
 ACCELERATIONS, RATES, DIFFERENCES = ("ax", "ay", "az"), ("gyro x", "gyro y", "gyro z"), ("m2-m1", "m3-m1", "m4-m1")
 #: Names of the columns of `nine_channels`.
-NAMES = (*ACCELERATIONS, *RATES, *DIFFERENCES)
+PAPER_CHANNELS = (*ACCELERATIONS, *RATES, *DIFFERENCES)
 
 
 def nine_channels(log: FlightLog) -> np.ndarray:

@@ -8,6 +8,8 @@ import numpy as np
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import unknown
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
+from airtouch.logs.in_flight import AIRBORNE_RANGE_M, airborne
+from airtouch.parameters import DEFAULT
 from airtouch.reference.motion_channels import ACCELERATION, CHANNEL_TABLE, MOTORS, RATES, MotionConfig
 
 SENSORS = (ACCELERATION, RATES, MOTORS)
@@ -88,6 +90,20 @@ def without(log: FlightLog, sensors: tuple[str, ...]) -> FlightLog:
             raise unknown("sensor", sensor, SENSORS)
     dropped = {name for sensor in sensors for name in columns[sensor]}
     return FlightLog({name: values for name, values in log.columns.items() if name not in dropped}, log.meta)
+
+
+def airborne_by(log: FlightLog) -> tuple[np.ndarray, str]:
+    """True where the drone is in the air, (n,) bool, and what says so, for messages.
+
+    By the motors, else by the down range or the height (`logs.airborne`), else by the rates (`is_flying`). Raises
+    AirTouchError, naming columns, for a log without any of them.
+    """
+    if log.has(*PWM):
+        return airborne(log), f"mean PWM above {DEFAULT.arm_pwm:g}"
+    heights = [name for name in ("zrange_m", "z_m") if log.has(name) and np.isfinite(log[name]).any()]
+    if heights or not log.has(*GYRO):
+        return airborne(log), f"a down range or height above {AIRBORNE_RANGE_M:g} m"
+    return is_flying(log.stack(GYRO)), "rates that change as in flight; no motors in this log"
 
 
 def is_flying(gyro: np.ndarray) -> np.ndarray:

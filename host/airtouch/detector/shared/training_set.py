@@ -22,7 +22,7 @@ def flight_hash(log: FlightLog) -> str:
     """Hash of a flight's motion, DIGITS hexadecimal digits: the same whatever the file's name or format.
 
     It covers rates and motors, or accelerations where neither is logged, to six digits each: a log that is written
-    anew has the same hash.
+    anew with the same columns of these has the same hash. One that lacks a column of them has another.
     """
     names = [name for name in (*GYRO, *PWM) if log.has(name)] or [n for n in (*ACC_WORLD, *ACC) if log.has(n)]
     total = hashlib.sha256()
@@ -32,7 +32,10 @@ def flight_hash(log: FlightLog) -> str:
 
 
 def contains(metadata: Mapping[str, Any], log: FlightLog) -> bool:
-    """Whether a model with this metadata was trained on the flight: by hash; by name where a model has no hashes."""
+    """Whether a model with this metadata was trained on the flight: by hash; by name where a model has no hashes.
+
+    A flight is not recognised from a log that holds more or fewer of rates and motors than the one trained on.
+    """
     hashes = metadata.get("flight_hashes")
     if isinstance(hashes, list) and hashes:
         return flight_hash(log) in hashes

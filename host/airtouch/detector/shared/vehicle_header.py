@@ -17,9 +17,7 @@ def render(vehicle: Vehicle) -> str:
 
     Raises AirTouchError where the vehicle has no platform, or a name that cannot be a file's.
     """
-    name, platform = vehicle.name, vehicle.platform
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name):
-        raise AirTouchError(f"vehicle {name!r}: the name becomes a file's; use letters, digits, '.', '-' and '_'")
+    name, platform = name_of(vehicle), vehicle.platform
     if not re.fullmatch(r"[a-z0-9]+", platform):
         raise AirTouchError(f"vehicle {name}: says no platform of crazyflie-firmware; "
                             'add platform = "cf2" (or cf21bl, bolt, ...) to its file')
@@ -47,6 +45,14 @@ static const airtouchVehicle_t airtouchVehicle = {{
     .nominalVoltage = {values[2]},
 }};
 """
+
+
+def name_of(vehicle: Vehicle) -> str:
+    """The vehicle's name as C sources have it. Raises AirTouchError for one that cannot be a file's."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", vehicle.name):
+        raise AirTouchError(f"vehicle {vehicle.name!r}: the name becomes a file's; use letters, digits, '.', '-' and "
+                            "'_'")
+    return vehicle.name
 
 
 def thrust_text(vehicle: Vehicle, arm_pwm: float) -> str:

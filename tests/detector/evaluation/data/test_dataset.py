@@ -2,7 +2,7 @@
 
 import pytest
 
-from airtouch.detector.evaluation.data.dataset import Condition, collect, read_manifest
+from airtouch.detector.evaluation.data.dataset import Condition, collect, not_taken, read_manifest
 from airtouch.errors import AirTouchError
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps\n"
@@ -59,6 +59,16 @@ def test_a_manifest_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "manifest.csv").write_bytes(b"\xff\xfe\x00file")
     with pytest.raises(AirTouchError, match="cannot be read"):
         collect([tmp_path])
+
+
+@pytest.mark.parametrize("row", ["sub/c.csv", "./c.csv"])
+def test_a_flight_in_a_folder_of_the_manifests_folder_has_its_condition(tmp_path, row):
+    place = folder(tmp_path, HEADER + f"{row},clean,1,low,30,fan,0.3\n")
+    (place / row).parent.mkdir(exist_ok=True)
+    (place / row).write_bytes((place / "a.csv").read_bytes())
+    (file,) = collect([place])
+    assert file.path == place / row and file.condition.height == "low" and file.condition.speed_mps == 0.3
+    assert not_taken([place])["not in the manifest"] == 3  # a.csv, b.csv and c.csv.gz
 
 
 def test_a_missing_file_and_an_empty_folder_are_refused(tmp_path):

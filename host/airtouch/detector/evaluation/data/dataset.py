@@ -85,9 +85,10 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
             manifest = folder / MANIFEST
             manifests[folder] = read_manifest(manifest) if manifest.is_file() else {}
         listed = manifests[folder]
+        condition_of = {folder / name: condition for name, condition in listed.items()}
         files = _flights_of(path, listed) if path.is_dir() else [path]
         for file in files:
-            condition = listed.get(file.name, Condition())
+            condition = condition_of.get(file, Condition())
             if condition.day is None:
                 condition = replace(condition, day=day_of(file))
             if condition.speed_mps is None and speed_mps is not None:
@@ -114,9 +115,9 @@ def not_taken(paths: Iterable[str | Path]) -> Counter[str]:
     """Reason -> number of the flights in folders that `collect` does not take because of the folder's manifest."""
     reasons: Counter[str] = Counter()
     for folder in {p.resolve(): p for p in map(Path, paths) if (p / MANIFEST).is_file()}.values():
-        listed = read_manifest(folder / MANIFEST)
+        listed = {folder / name: condition for name, condition in read_manifest(folder / MANIFEST).items()}
         reasons.update(f"{c.use} in the manifest" for c in listed.values() if c.use not in (None, "clean"))
-        reasons["not in the manifest"] += sum(f.name not in listed for f in in_folder(folder))
+        reasons["not in the manifest"] += sum(f not in listed for f in in_folder(folder))
     return +reasons
 
 
