@@ -8,9 +8,9 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.logs import true_edges
-from airtouch.simulation import effects, flight, loop, scenario
+from airtouch.simulation import effects, flight, scenario
 from airtouch.simulation.firmware import battery_compensation, controller, setpoint, settings
-from airtouch.simulation.sensors import log_row, ranging
+from airtouch.simulation.sensors import ranging
 from airtouch.simulation.stepper import Stepper
 
 PLATFORM = """
@@ -211,40 +211,3 @@ def test_slope_of_the_compensation_is_that_of_its_commands(vehicle, firmware):
     low, high = (battery_compensation.compensate(row["firmware"], row, 3.8, c) for c in (44000.0, 46000.0))
     slope = battery_compensation.slope(row["firmware"], row, 0.5 * (low + high))
     assert slope == pytest.approx((high - low) / 2000.0, rel=0.01) and 0.4 < slope < 0.7
-
-
-BESIDE = """
-[[platform]]
-size_m = [3.0, 1.0]
-centre_m = [2.0, {centre}]
-top_m = {top}
-[[mission.step]]
-do = "take-off"
-height_m = 0.4
-[[mission.step]]
-do = "hover"
-time_s = 2.0
-[[mission.step]]
-do = "go"
-distance_m = 2.5
-speed_mps = 0.3
-"""
-
-
-def beside(vehicle, top, gap):
-    """Where a pass along a block of that height ends, whose side is `gap` m to the left of the path."""
-    plan = scenario.draw_flight(scenario.parse(BESIDE.format(centre=0.5 + gap, top=top), "beside"), 0, 0)
-    stepper = Stepper(plan, vehicle, 0, 0, ())
-    stepper.begin(plan.setpoints[0])
-    table = np.zeros((len(plan.setpoints), log_row.COLUMNS))
-    ending, rows = stepper.fly(plan.setpoints, table)
-    return loop.ENDINGS[ending], table[rows - 1, log_row.POSITION]
-
-
-def test_a_flight_into_the_side_of_a_block_ends_there(ideal):
-    """The block begins 0.5 m ahead. Half of the rotor spacing, 33 mm, decides whether a rotor meets its side."""
-    half = ideal.arm_m / np.sqrt(2.0)
-    ended, x = beside(ideal, 0.7, half - 0.02)
-    assert ended == "it struck a surface" and x == pytest.approx(0.5 - half, abs=0.03)
-    assert beside(ideal, 0.7, half + 0.2)[0] == "ok"
-    assert beside(ideal, 0.2, half - 0.02)[0] == "ok"  # it passes above

@@ -254,7 +254,7 @@ def without_heading(acc_world, quaternion):
 
 @pytest.mark.parametrize("setting", [{"speed": 0.0}, {"port": 99999}, {"faults": ["loss=2"]},
                                      {"faults": ["rain=1"]}, {"faults": ["disconnect=3"]},
-                                     {"record": "/nowhere/at/all.csv"}])
+                                     {"record": "/dev/null/at/all.csv"}])
 def test_wrong_settings_are_named(setting):
     settings = {"port": 0, **setting}
     if "record" in settings:

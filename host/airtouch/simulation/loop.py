@@ -17,7 +17,6 @@ from airtouch.simulation.body import battery, forces, motors, rigid_body
 from airtouch.simulation.compiled import inlined, jit
 from airtouch.simulation.effects.slots import EFFECT_SLOTS, EffectSlots
 from airtouch.simulation.firmware import autopilot
-from airtouch.simulation.flight_plan import world
 from airtouch.simulation.flight_plan.world import WORLD, World
 from airtouch.simulation.plant import PLANT
 from airtouch.simulation.sensors import imu, log_row, multi_ranger, ranging
@@ -101,26 +100,11 @@ def move(flight, fixed, volts):
     motors.drive(plant, state, fixed.noise, volts, flight.generators[0].motors[:])
     forces.act(plant, state, flight.world, flight.effects, fixed.hover_speed)
     rigid_body.advance(plant, fixed.body, state.body)
-    return _ending(state, flight.world)
+    return _ending(state)
 
 
 @jit
-def _rotor_in_side(s, ground):
-    """Whether the centre of a rotor is inside a platform. s (COUNT,): signals of the step."""
-    r, p, highest = at.ROTATION, at.POSITION, len(ground.first) - 2
-    if highest < 0:
-        return False
-    for i in range(4):
-        x, y = s[at.ROTOR_X + i], s[at.ROTOR_Y + i]
-        z = s[p + 2] + s[r + 6] * x + s[r + 7] * y
-        if z < ground.surface[highest, world.TOP]:
-            if world.in_side(ground, s[p] + s[r] * x + s[r + 1] * y, s[p + 1] + s[r + 3] * x + s[r + 4] * y, z):
-                return True
-    return False
-
-
-@jit
-def _ending(state, ground):
+def _ending(state):
     """OK, or the reason why the flight ends here."""
     pose, total = state.body.state, 0.0
     for i in range(rigid_body.STATE_SIZE):
@@ -129,7 +113,7 @@ def _ending(state, ground):
         return NOT_FINITE
     if state.forces.signals[at.ROTATION + 8] < LEAST_UPRIGHT:
         return UPSET
-    if state.forces.deepest > FLOOR_DEPTH_M or _rotor_in_side(state.forces.signals, ground):
+    if state.forces.deepest > FLOOR_DEPTH_M:
         return STRUCK
     if abs(pose[0]) > FAR_M or abs(pose[1]) > FAR_M or abs(pose[2]) > HIGH_M:
         return LOST

@@ -65,8 +65,10 @@ def is_one_passing_effect(selection: Selection) -> bool:
 def is_of_the_loop_alone(data: Data, selection: Selection) -> bool:
     """Whether effects are named, and all of them are of the control loop."""
     hypothesis, names = selection.named_hypothesis, [s.name for s in selection.named_steps]
-    if hypothesis is None or len(names) == 1:
-        return hypothesis is not None and _of_the_loop(data, hypothesis.terms)
+    if hypothesis is None or not names:
+        return False
+    if len(names) == 1:
+        return _of_the_loop(data, hypothesis.terms)
     return not _not_of_the_loop(data, hypothesis.terms, names)
 
 

@@ -163,18 +163,6 @@ def top_at(world, x, y):
 
 
 @jit
-def in_side(world, x, y, z):
-    """Whether the point is inside a platform, by more than ABOVE_M under its top: it came through its side."""
-    for k in range(len(world.first) - 2, -1, -1):
-        if world.surface[k, TOP] <= z + ABOVE_M:
-            return False
-        if not _beyond(world, k, x, y, 0.0):
-            if inside_by(world.corners, world.first[k], world.first[k + 1], x, y) >= 0.0:
-                return True
-    return False
-
-
-@jit
 def first_below(world, places):
     """Index of the first of places (n, 3) that is below the surface at its x and y; NONE if there is none."""
     for i in range(len(places)):
