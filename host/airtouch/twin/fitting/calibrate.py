@@ -69,7 +69,7 @@ def of_flights(paths: Sequence[Path], vehicle: Vehicle, work: Path, *, speed_mps
     with bar("reading again") as report:
         recorded = recorded_flights.read(paths, speed_mps=speed_mps,
                                          progress=lambda done, total: report(done, total, ""))
-    out = work / f"twin_{key(recorded, vehicle, rounds=ROUNDS, flights=BATCH, seed=seed)}"
+    out = work / f"twin_{key(recorded, vehicle, flights=BATCH, seed=seed)}"
     calibrate(recorded, vehicle, out, rounds=ROUNDS, flights=BATCH, seed=seed, bar=bar)
     return Twin(scenario.load(out / files.SCENARIO), vehicles.load(str(out / files.VEHICLE)),
                 f"twin fitted to {len(recorded.courses)} of them")
@@ -85,7 +85,7 @@ def calibrate(recorded: RecordedFlights, vehicle: Vehicle, out: Path, *, rounds:
     """
     make_folder(out)
     workers = workers or available_cores()
-    target, levers, fit_key = _request(recorded, vehicle, rounds, flights, seed)
+    target, levers, fit_key = _request(recorded, vehicle, flights, seed)
     with bar("fitting") as report:
         state = fit.fit(target, vehicle, levers, rounds=rounds, flights=flights, seed=seed, workers=workers,
                         fixed=lever_set.FIXED, state_file=out / FIT,
@@ -100,18 +100,17 @@ def calibrate(recorded: RecordedFlights, vehicle: Vehicle, out: Path, *, rounds:
     return Calibration(target, levers, state.refined, state.history)
 
 
-def key(recorded: RecordedFlights, vehicle: Vehicle, *, rounds: int, flights: int, seed: int) -> str:
+def key(recorded: RecordedFlights, vehicle: Vehicle, *, flights: int, seed: int) -> str:
     """Hash, of twelve digits, of the flights, the vehicle and the settings of a fit."""
-    return _request(recorded, vehicle, rounds, flights, seed)[2]
+    return _request(recorded, vehicle, flights, seed)[2]
 
 
-def _request(recorded: RecordedFlights, vehicle: Vehicle, rounds: int, flights: int, seed: int,
+def _request(recorded: RecordedFlights, vehicle: Vehicle, flights: int, seed: int,
              ) -> tuple[Target, tuple[Lever, ...], str]:
     """Target, levers and key of the fit that these arguments ask for."""
     target = fit.target_of(recorded.courses, recorded.features)
     levers = lever_set.default(vehicle, recorded.near)
-    return target, levers, fit.key(target, vehicle, levers, rounds=rounds, flights=flights, seed=seed,
-                                   fixed=lever_set.FIXED)
+    return target, levers, fit.key(target, vehicle, levers, flights=flights, seed=seed, fixed=lever_set.FIXED)
 
 
 def in_words(misfit: dict[str, float]) -> str:

@@ -116,7 +116,7 @@ def fit(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: in
     fixed: effects without levers. state_file: each finished round is written to it, and a stopped fit continues from
     it. Raises AirTouchError if it is a fit of other flights or settings, and if most flights of a round diverge.
     """
-    fit_key = key(target, vehicle, levers, rounds=rounds, flights=flights, seed=seed, fixed=fixed)
+    fit_key = key(target, vehicle, levers, flights=flights, seed=seed, fixed=fixed)
     state = load(state_file, fit_key) or State(lever_set.starts(levers), [], [], [])
     settings = _Settings(target, vehicle, levers, rounds, flights, seed, fixed, workers)
     for number in range(len(state.history), rounds):
@@ -129,11 +129,11 @@ def fit(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: in
     return state
 
 
-def key(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int = ROUNDS, flights: int = FLIGHTS,
-        seed: int = 0, fixed: Mapping[str, Any] | None = None) -> str:
-    """Hash, of twelve digits, of everything that a fit depends on; its last LAST_ROUNDS steps depend on `rounds`."""
+def key(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: int = FLIGHTS, seed: int = 0,
+        fixed: Mapping[str, Any] | None = None) -> str:
+    """Hash, of twelve digits, of everything that a round depends on; the number of rounds does not enter."""
     courses = [replace(course, source="") for course in target.courses]
-    text = repr((courses, vehicle, tuple(levers), rounds, flights, seed, fixed))
+    text = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
     return hashlib.sha256(text.encode() + np.ascontiguousarray(target.features).tobytes()).hexdigest()[:12]
 
 
