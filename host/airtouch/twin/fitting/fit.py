@@ -111,7 +111,7 @@ def target_of(courses: Sequence[Course], features: np.ndarray) -> Target:
 def fit(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: int = ROUNDS, flights: int = FLIGHTS,
         seed: int = 0, fixed: Mapping[str, Any] | None = None, workers: int = 1, state_file: Path | None = None,
         progress: Progress | None = None) -> State:
-    """The state after all rounds. The same arguments give the same result.
+    """The state after all rounds. The same arguments give the same result, if the fit began with as many rounds.
 
     fixed: effects without levers. state_file: each finished round is written to it, and a stopped fit continues from
     it. Raises AirTouchError if it is a fit of other flights or settings, and if most flights of a round diverge.
@@ -131,7 +131,10 @@ def fit(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, rounds: in
 
 def key(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: int = FLIGHTS, seed: int = 0,
         fixed: Mapping[str, Any] | None = None) -> str:
-    """Hash, of twelve digits, of everything that a round depends on; the number of rounds does not enter."""
+    """Hash, of twelve digits, of everything that a fit depends on but the number of its rounds.
+
+    So a fit can go on for more rounds. As the last steps are shortened, its result is then not that of as many at once.
+    """
     courses = [replace(course, source="") for course in target.courses]
     text = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
     return hashlib.sha256(text.encode() + np.ascontiguousarray(target.features).tobytes()).hexdigest()[:12]
