@@ -215,6 +215,20 @@ def test_an_error_of_ours_lands_first(tmp_path):
     assert len(logs.read(tmp_path / "f_0001.csv.gz.part")) > 300  # readable though nobody finished it
 
 
+@pytest.mark.parametrize(("height", "least_s"), [(0.3, 2.0), (2.5, 2.5 / 0.3)])
+def test_after_an_error_it_lands_as_slowly_as_a_mission(tmp_path, height, least_s):
+    def show(flight):
+        if flight.pilot.leg and flight.pilot.leg.kind == "hover":
+            raise RuntimeError("a bug")
+
+    craft, legs = FakeCraft(), (mission.Leg("take-off", 0, 0, height, 3.0), mission.Leg("hover", 0, 0, height, 3.0))
+    with pytest.raises(RuntimeError, match="a bug"):
+        fly(craft, tmp_path, legs=legs, show=show)
+    (landed_s, land), (stopped_s, _) = craft.heard[-2:]
+    assert land.kind == "land" and land.seconds == pytest.approx(least_s)
+    assert stopped_s - landed_s > least_s and not craft.crashed
+
+
 def test_an_error_after_the_landing_sends_no_land_command(tmp_path, monkeypatch):
     def tail(flight):
         raise RuntimeError("a bug")

@@ -5,8 +5,9 @@ import csv
 import numpy as np
 import pytest
 
+from airtouch.cli.drone.collect import _report
 from airtouch.crazyflie import manifest
-from airtouch.crazyflie.collect import prepare_folder
+from airtouch.crazyflie.collect import Outcome, prepare_folder
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
@@ -21,14 +22,16 @@ def flight(lost=0, zrange=None, **meta) -> FlightLog:
     return FlightLog(columns, {"lost_samples": lost, **meta})
 
 
-def over_a_platform() -> np.ndarray:
-    """A down range of 0.8 m, and 0.4 m over a platform in the middle."""
-    return np.where(np.arange(200) // 50 % 4 == 1, 0.4, 0.8)
+def over_a_platform(height_m: float = 0.4) -> np.ndarray:
+    """A down range of 0.8 m, and less over a platform in the middle."""
+    return np.where(np.arange(200) // 50 % 4 == 1, 0.8 - height_m, 0.8)
 
 
 @pytest.mark.parametrize("lost_samples, zrange, planned, use", [
     (0, over_a_platform(), True, "clean"),
     (0, np.full(200, 0.8), True, "free-air"),
+    (0, over_a_platform(0.05), True, "free-air"),  # an unevenness of the floor
+    (0, over_a_platform(0.2), True, "messy"),  # the effect of a platform, but no true edge
     (0, None, True, "clean"),  # nothing says that there was no edge
     (0, over_a_platform(), False, "messy"),
     (2, over_a_platform(), True, "clean"),  # 2 of 202
@@ -36,6 +39,13 @@ def over_a_platform() -> np.ndarray:
 ])
 def test_use_of_a_flight(lost_samples, zrange, planned, use):
     assert manifest.use_of(flight(lost_samples, zrange), planned) == use
+
+
+def test_the_reason_is_said_where_a_low_platform_makes_a_flight_messy(capsys, tmp_path):
+    for height_m, said in ((0.2, True), (0.4, False), (0.0, False)):
+        log = flight(zrange=over_a_platform(height_m), longest_gap_s=0.0)
+        _report(Outcome(tmp_path / "a.csv", "as planned", log, use=manifest.use_of(log, planned=True)))
+        assert ("listed as messy: the platform is higher than 0.12 m" in capsys.readouterr().out) == said
 
 
 def test_a_row_has_the_values_of_its_mission_and_replaces_an_older_one(tmp_path):

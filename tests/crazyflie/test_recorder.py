@@ -59,13 +59,32 @@ def test_force_does_not_touch_a_flight_that_is_being_recorded(tmp_path):
     assert len(os.listdir("/proc/self/fd")) == files
 
 
-def test_force_replaces_what_a_killed_flight_left(tmp_path):
-    part = tmp_path / "a_0001.csv.gz.part"
-    part.write_text("older and longer\n" * 100)
-    book = Recorder(tmp_path / "a_0001.csv.gz", NAMES, {}, force=True)
-    book.add(*rows([1000]))
-    assert "older" not in part.read_text() and list(logs.read(part)["t_s"]) == [1.0]
-    book.finish()
+def test_what_a_run_killed_under_force_left_gets_the_next_number(tmp_path):
+    path = tmp_path / "a_0001.csv.gz"
+    Recorder(path, NAMES, {}).finish()
+    for times in ([0, 10], [1000, 1010, 1020]):  # a finished flight, then one that is to replace it and is killed
+        book = Recorder(path, NAMES, {}, force=True)
+        book.add(*rows(times))
+        if len(times) == 2:
+            book.finish()
+    os.close(book._file)  # as by a kill
+    received = book.part.read_bytes()
+    with pytest.raises(AirTouchError, match="a_0001.csv.gz.part: an unfinished flight; .* --recover"):
+        Recorder(path, NAMES, {}, force=True)
+    assert book.part.read_bytes() == received
+    assert recorder.recover(tmp_path) == ([tmp_path / "a_0002.csv.gz"], [])
+    assert [len(logs.read(tmp_path / f"a_000{k}.csv.gz")) for k in (1, 2)] == [2, 3] and not book.part.exists()
+
+
+def test_a_recovery_that_cannot_be_written_names_the_unfinished_file(tmp_path, monkeypatch):
+    def full(log, path):
+        raise AirTouchError(f"{path}: no room")
+
+    (tmp_path / "a_0001.csv.gz.part").write_text("t_s,zrange_m\n0,1\n0.01,1\n")
+    monkeypatch.setattr(logs, "write", full)
+    (line,) = recorder.recover(tmp_path)[1]
+    assert line.startswith(str(tmp_path / "a_0001.csv.gz.part: ")) and line.endswith("no room")
+    assert (tmp_path / "a_0001.csv.gz.part").exists()
 
 
 def test_the_next_number_is_above_those_in_the_folder(tmp_path):

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from airtouch.crazyflie.connection.commands import Command
-from airtouch.crazyflie.mission import LANDING_MPS, Leg
+from airtouch.crazyflie.mission import Leg, landing_seconds
 
 RESEND_S = 0.3  #: s without an answer, after which a command is sent again
 SILENT_S = 1.0  #: s without a packet, after which nothing is sent until one comes; chosen
@@ -128,9 +128,12 @@ class Autopilot:
         if self._command is not None:  # answered, and its duration is over
             self.phase, self.in_air = "done", False
             return [Command("stop")]
+        return self._send(self.landing_command(), now_s, wall_s)
+
+    def landing_command(self) -> Command:
+        """The command to land from anywhere on the legs so far, slow enough for the highest of them."""
         height = max((leg.z_m for leg in self.legs[:self.index + 1]), default=0.0)
-        seconds = max(2.0, height / LANDING_MPS)
-        return self._send(Command("land", z_m=self.origin.z_m, seconds=seconds), now_s, wall_s)
+        return Command("land", z_m=self.origin.z_m, seconds=landing_seconds(height))
 
     def _send(self, command: Command, now_s: float, wall_s: float) -> list[Command]:
         same = self._command is not None and self._command.kind == command.kind

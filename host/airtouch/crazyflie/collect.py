@@ -22,15 +22,13 @@ from airtouch.crazyflie.connection.drone import Drone
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.flight import LINK_TIMEOUT_S, Flight
 from airtouch.crazyflie.guard import guarding
-from airtouch.crazyflie.mission import LANDING_MPS, Mission
+from airtouch.crazyflie.mission import Mission, landing_seconds
 from airtouch.crazyflie.readiness import Readiness, origin_of, settle
 from airtouch.crazyflie.recorder import LEAST_FREE_BYTES, Recorder, flight_path
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import MANIFEST
 from airtouch.logs.flight_log import FlightLog
 from airtouch.vehicle import DEFAULT_VEHICLE
-
-LEAST_DOWN_S = 2.0  #: s, shortest landing of the guard
 
 
 @dataclass(frozen=True)
@@ -98,8 +96,7 @@ def fly(drone: Drone, ready: Readiness, mission: Mission, plan: Plan, number: in
     intake = Intake(ready.slow)
     path = flight_path(plan.out, plan.name, number)
     recorder = Recorder(path, intake.names, meta_of(drone, ready, mission, plan, number), plan.force)
-    height = max((leg.z_m for leg in mission.legs), default=0.0)
-    down_s = max(LEAST_DOWN_S, height / LANDING_MPS)
+    down_s = landing_seconds(max((leg.z_m for leg in mission.legs), default=0.0))
     outcome = Outcome(path, "an error", recorder.log())
     try:
         origin = origin_of(settle(drone, ready, plan.least_v, stop).latest)

@@ -26,7 +26,6 @@ PING_S = 0.5  #: s between echo requests, which keep a quiet link open
 LINK_TIMEOUT_S = 3.0  #: s of silence, after which the drone lands as soon as the link is back
 FORGOTTEN_S = 1.0  #: s of silence, after which the firmware has deleted the log blocks
 GIVE_UP_S = 60.0  #: s without an answer to the land command, after which the flight gives up
-DOWN_S = 3.0  #: s, duration of a landing after an error
 SILENCE_S = 0.5  #: s without a packet that the flight notes; chosen
 LAND_TRIES, LAND_WAIT_S = 50, 0.1  #: land commands after an error, and s to wait for the answer to each; chosen
 STOP_EVERY_S = 5 * TURN_S  #: s between two "stop" commands after a flight; chosen
@@ -269,7 +268,7 @@ class Flight:
             self._on_the_ground()
             return
         self._tell("an error in flight: landing")
-        command = Command("land", z_m=self.pilot.origin.z_m, seconds=DOWN_S)
+        command = self.pilot.landing_command()
         for _ in range(LAND_TRIES):
             try:
                 self.craft.send([command])

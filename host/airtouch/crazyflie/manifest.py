@@ -11,6 +11,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.edges import true_edges
 from airtouch.logs.files import MANIFEST, read_text, write_bytes
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.segments import PLATFORM_STEP_M
 
 COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
 FOLDS = 5  #: folds of cross-validation, as in the authors' manifest
@@ -39,18 +40,28 @@ def list_flight(file: Path, log: FlightLog, planned: bool) -> str:
 def use_of(log: FlightLog, planned: bool) -> str:
     """What a flight can be used for.
 
-    "clean": ended as planned, with few lost samples, and crossed an edge. "free-air": the same without an edge.
-    "messy": any other.
+    "clean": ended as planned, with few lost samples, and crossed an edge. "free-air": the same without an edge, of a
+    low platform neither. "messy": any other.
     """
     lost = log.meta["lost_samples"]
     if not planned or lost > CLEAN_LOSS * (len(log) + lost):
         return "messy"
-    return "clean" if crossed_an_edge(log) else "free-air"
+    if crossed_an_edge(log):
+        return "clean"
+    return "messy" if over_low_platforms_only(log) else "free-air"
 
 
 def crossed_an_edge(log: FlightLog) -> bool:
     """True if the down range shows an edge, or if there is no down range."""
     return not log.has("zrange_m") or bool(true_edges(log))
+
+
+def over_low_platforms_only(log: FlightLog) -> bool:
+    """True if the down range steps by more than PLATFORM_STEP_M, but nowhere by as much as at a true edge.
+
+    Scores have no true edges of such a flight, and over the platform it is not in free air.
+    """
+    return not crossed_an_edge(log) and bool(true_edges(log, PLATFORM_STEP_M))
 
 
 def recover(folder: Path) -> tuple[list[Path], list[str]]:

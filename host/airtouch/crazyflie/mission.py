@@ -19,6 +19,7 @@ from airtouch.simulation.flight_plan.mission import RATE_HZ
 SHORTEST_S = 0.05  #: s; a shorter stop is a corner, no hover
 LEVEL_M = 1e-3  #: m; a leg that ends so near to its first height is level
 LANDING_MPS = 0.3  #: m/s; assumed, within the firmware's range for landings
+LEAST_LANDING_S = 2.0  #: s, shortest landing
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,12 @@ def _leg(kind: str, end: Sequence[float], seconds: float) -> Leg:
 
 def landing(last: Leg) -> Leg:
     """A landing straight down from the end of a leg."""
-    return replace(last, kind="land", z_m=0.0, seconds=max(2.0, last.z_m / LANDING_MPS))
+    return replace(last, kind="land", z_m=0.0, seconds=landing_seconds(last.z_m))
+
+
+def landing_seconds(height_m: float) -> float:
+    """The duration (s) of a landing from this height over the take-off: 0.3 m/s on average, 2 s at least."""
+    return max(LEAST_LANDING_S, height_m / LANDING_MPS)
 
 
 def _at_start(places: np.ndarray, yaw: float) -> np.ndarray:

@@ -53,10 +53,10 @@ class Recorder:
         self._rows: list[np.ndarray] = []
         self._times: list[np.ndarray] = []
         try:
-            self._file = _open_locked(self.part, force)
+            self._file = _open_locked(self.part)
         except OSError as error:
             raise AirTouchError(f"{self.part}: cannot be written: {error.strerror}; is another flight being "
-                                f"recorded there?{'' if force else ' --force replaces it'}") from None
+                                "recorded there?") from None
         header = [f"# {key}: {json.dumps(value, default=str)}" for key, value in self.meta.items()]
         self._write("\n".join([*header, ",".join(self.names)]) + "\n")
 
@@ -115,26 +115,38 @@ class Recorder:
         os.close(self._file)
 
 
-def _open_locked(part: Path, force: bool) -> int:
-    """A descriptor of the empty, locked file. It is emptied only once the lock is held: another process may write it.
+def _open_locked(part: Path) -> int:
+    """A descriptor of the empty, locked file.
 
-    Raises OSError if another process holds the lock, and without `force` if the file exists.
+    Raises OSError if another process holds the lock, and AirTouchError if the file holds what a killed flight left.
     """
-    file = os.open(part, os.O_WRONLY | os.O_CREAT | (0 if force else os.O_EXCL), 0o644)
+    file = os.open(part, os.O_WRONLY | os.O_CREAT, 0o644)
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if stat.S_ISREG(os.fstat(file).st_mode):
-            os.ftruncate(file, 0)
-    except OSError:
+        found = os.fstat(file)
+        if stat.S_ISREG(found.st_mode) and found.st_size:
+            raise AirTouchError(f"{part}: an unfinished flight; finish it with airtouch collect --recover, or remove "
+                                "it")
+    except (OSError, AirTouchError):
         os.close(file)
         raise
     return file
 
 
+def _free_path(part: Path) -> Path:
+    """The file that an unfinished file becomes: that of its own number, or of the next free one if there is such."""
+    path = part.with_name(part.name.removesuffix(PART))
+    if not path.exists():
+        return path
+    name = path.name.removesuffix(SUFFIX).rpartition("_")[0] or "flight"
+    return flight_path(part.parent, name, next_number(part.parent, name))
+
+
 def recover(folder: Path) -> tuple[list[Path], list[str]]:
     """Finish the unfinished files that killed runs left in a folder. Returns the files, and a line for each failure.
 
-    Files that another process still writes are skipped. Files that cannot be read stay as they are.
+    Where the number has a finished flight, as after a kill under --force, it gets the next free one. Files that
+    another process still writes are skipped. Files that cannot be read stay as they are.
     """
     finished, unreadable = [], []
     for part in sorted(folder.glob(f"*{SUFFIX}{PART}")):
@@ -148,7 +160,7 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 continue
-        path = part.with_name(part.name.removesuffix(PART))
+        path = _free_path(part)
         try:
             log = logs.read(part)
             timed = np.flatnonzero(np.isfinite(log["t_s"]))
@@ -159,9 +171,13 @@ def recover(folder: Path) -> tuple[list[Path], list[str]]:
             missing = gaps(np.round(whole["t_s"] * 1000.0))
             whole.meta |= {"ended": "the process was killed", "lost_samples": sum(g.lost for g in missing),
                            "longest_gap_s": max((g.seconds for g in missing), default=0.0)}
-            logs.write(whole, path)
         except AirTouchError as error:
             unreadable.append(str(error))
+            continue
+        try:
+            logs.write(whole, path)
+        except AirTouchError as error:
+            unreadable.append(f"{part}: {error}")
             continue
         finished.append(path)
         part.unlink()

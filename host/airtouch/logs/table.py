@@ -82,10 +82,11 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
 
     body: the rows, with LF line ends. first_line: the number of its first line in the file.
     Empty cells become NaN, blank lines are skipped. A truncated last line is dropped, with a
-    warning. Raises AirTouchError with file and line for any other bad cell or row.
+    warning: one without a line end, as its last number may lack digits, or else a bad one. Raises
+    AirTouchError with file and line for any other bad cell or row.
     """
-    cut = not body.endswith(b"\n")
-    if cut and body.endswith(b","):  # an unfinished row, not an empty cell
+    cut = bool(body.rpartition(b"\n")[2].strip())
+    if cut:
         body = _without_last_line(body, first_line, warnings)
     if not body or body.isspace():
         raise AirTouchError(f"{source}: no complete row of data; log the flight again or leave the file out")
@@ -98,7 +99,7 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
     if table is not None:
         return table
     bad_line, problem, is_last = _first_problem(body, columns)
-    if is_last:
+    if is_last and not cut:
         shorter = _without_last_line(body, first_line, warnings)
         table = None if shorter.isspace() or not shorter else _bulk(shorter, columns)
         if table is not None:

@@ -26,7 +26,7 @@ _ENDS = np.linalg.inv([[1.0, 1.0, 1.0, 1.0], [4.0, 5.0, 6.0, 7.0], [12.0, 20.0, 
 
 @dataclass(frozen=True)
 class Goal:
-    """A set-point: position (3,) in m, velocity (3,) in m/s, yaw in rad, yaw rate in rad/s."""
+    """A set-point: position, velocity, acceleration, (3,) each, in m, m/s, m/s²; yaw in rad and its rate in rad/s."""
 
     position: np.ndarray
     velocity: np.ndarray

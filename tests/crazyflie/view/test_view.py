@@ -3,6 +3,7 @@
 import io
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -43,6 +44,14 @@ def columns(n):
     c = {f"gyro_{a}_radps": np.zeros(n) for a in "xyz"} | {f"m{i}_pwm": np.full(n, 4e4) for i in range(1, 5)}
     return c | {"acc_z_mps2": np.full(n, 9.81), "zrange_m": np.full(n, 0.8), "vbat_V": np.full(n, 3.9),
                 "x_m": np.linspace(0, 1, n), "y_m": np.zeros(n)}
+
+
+@pytest.mark.parametrize("axis", ["x_m", "y_m"])
+def test_a_board_without_one_of_the_two_positions_has_no_track(axis):
+    board, some = Board("test", "best"), columns(100)
+    del some[axis]
+    board.add(np.arange(100) / 100, some, np.zeros(100))
+    assert np.isnan(board.add_edge("entry", 0.9, 0.97).x_m)
 
 
 def test_a_board_places_edges_one_lag_back_and_draws_itself():

@@ -93,6 +93,24 @@ def test_of_distance_sensors_the_one_that_looks_down_is_read(orientations, heigh
         assert np.nanmin(log["zrange_m"]) == np.nanmax(log["zrange_m"]) == height and not log.meta["warnings"]
 
 
+@pytest.mark.parametrize(("metres", "quality", "limits", "valid"), [
+    (0.8, 100, (0.1, 4.0), True), (0.8, -1, (0.1, 4.0), True), (0.8, 0, (0.1, 4.0), False),
+    (0.05, 100, (0.1, 4.0), False), (4.5, -1, (0.1, 4.0), False), (4.5, 100, (0.0, 0.0), True)])
+def test_a_range_that_px4_marks_as_invalid_is_missing(metres, quality, limits, valid):
+    """By the comments in DistanceSensor.msg: quality 0 is invalid, -1 unknown; limits of 0 were never set."""
+    pytest.importorskip("pyulog", reason="PX4 logs need the extra 'ulog'")
+    imu = topic(0, "sensor_combined", {"gyro_rad": 3, "accelerometer_m_s2": 3}, [(t, *[0.0] * 5, -9.81) for t in T])
+    definition = message("F", b"distance_sensor:uint64_t timestamp;float min_distance;float max_distance;"
+                              b"float current_distance;int8_t signal_quality;uint8_t orientation;")
+    content = [imu[0], definition, imu[1], message("A", struct.pack("<BH", 0, 1) + b"distance_sensor")]
+    for t in T[::20]:
+        reading = (metres, quality) if 1.5 < t < 2.5 else (1.0, 100)
+        content.append(message("D", struct.pack("<HQfffbB", 1, int(t * 1e6), *limits, *reading, 25)))
+    log = ulog.read(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + b"".join(content), "x.ulg")
+    middle, before = (log["zrange_m"][np.abs(log["t_s"] - t) < 0.3] for t in (2.0, 1.0))
+    assert np.isfinite(middle).all() == np.isfinite(middle).any() == valid and (before == 1.0).all()
+
+
 def test_without_pyulog_its_extra_is_named(monkeypatch):
     monkeypatch.setitem(__import__("airtouch.extras", fromlist=["EXTRAS"]).EXTRAS, "ulog",
                         ("no_such_module_of_this_name",))

@@ -121,6 +121,7 @@ def test_cut_gzip_keeps_what_is_readable():
     log = parse(data[: len(data) // 2], "f.csv.gz")
     assert 100 < len(log) < 400
     assert any("gzip file is cut off" in w for w in log.meta["warnings"])
+    assert any(f"line {len(log) + 1} is cut off" in w for w in log.meta["warnings"])
     with pytest.raises(AirTouchError, match="damaged"):
         parse(data[:100] + bytes(50) + data[150:], "f.csv.gz")
 

@@ -215,6 +215,7 @@ def _time_s(flight: "Flight") -> float:
 
 def _report(outcome: "collect.Outcome") -> None:
     from airtouch import logs
+    from airtouch.crazyflie import manifest
 
     log = outcome.log
     if not len(log):
@@ -228,6 +229,9 @@ def _report(outcome: "collect.Outcome") -> None:
     if outcome.use == "free-air":
         click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the "
                    "mission sweep does over its own")
+    if outcome.planned and manifest.over_low_platforms_only(log):
+        click.echo("listed as messy: the platform is higher than 0.12 m but lower than 0.30 m, the least step of a "
+                   "true edge, so the flight is neither scored nor in free air; fly over a higher platform")
     for edge in edges:
         click.echo(f"true {edge.kind:5} at {log['t_s'][edge.sample] - start:6.2f} s: "
                    f"down range {edge.height_before_m:.2f} to {edge.height_after_m:.2f} m")

@@ -88,7 +88,7 @@ class Board:
             except KeyError:  # a sensor that the log lacks
                 values = None
             self._signals[name].extend(np.full(len(times_s), np.nan) if values is None else values)
-        if "x_m" in columns:
+        if "x_m" in columns and "y_m" in columns:
             self._track += zip(times_s[::5], columns["x_m"][::5], columns["y_m"][::5], strict=True)
             if len(self._track) > MOST_TRACK:
                 self._track = thinned(self._track[:-DENSE_TRACK]) + self._track[-DENSE_TRACK:]

@@ -26,8 +26,8 @@ def read(data: bytes, source: str) -> FlightLog:
     """The flight log of a ULog file, at 100 Hz.
 
     Motors are those of `actuator_motors` (0 to 1) or, without that topic, of `actuator_outputs` (1000 to 2000 us),
-    scaled to 0..65535. The down range is that of the first distance sensor that looks down. Raises AirTouchError
-    without the extra 'ulog' and for a file without an IMU.
+    scaled to 0..65535. The down range is that of the first distance sensor that looks down; readings that PX4 marks
+    as invalid are NaN. Raises AirTouchError without the extra 'ulog' and for a file without an IMU.
     """
     need("ulog", f"{source}: reading PX4 logs")
     from pyulog import ULog
@@ -41,7 +41,7 @@ def read(data: bytes, source: str) -> FlightLog:
     down = [table for table in ranges if _looks_down(table)]
     warnings = []
     if ranges:
-        topics["distance_sensor"] = down[0] if down else {}
+        topics["distance_sensor"] = _valid_range(down[0]) if down else {}
         if not down:
             warnings.append("zrange_m is left out: no distance_sensor looks down (orientation 25)")
     signals: dict[str, Signal] = {}
@@ -71,6 +71,21 @@ def read(data: bytes, source: str) -> FlightLog:
 def _looks_down(table: dict) -> bool:
     """True for a distance sensor whose orientation is DOWN, or is not logged."""
     return "orientation" not in table or bool((np.asarray(table["orientation"]) == DOWN).all())
+
+
+def _valid_range(table: dict) -> dict:
+    """The table of a distance sensor with NaN for its invalid readings, by the fields of PX4's DistanceSensor message.
+
+    Invalid: a signal quality of 0 (-1 is unknown), or a distance outside of the sensor's limits, where they are set.
+    """
+    if "current_distance" not in table:
+        return table
+    distance = np.asarray(table["current_distance"], float)
+    invalid = np.asarray(table.get("signal_quality", np.full(len(distance), -1))) == 0
+    if "min_distance" in table and "max_distance" in table:
+        least, most = np.asarray(table["min_distance"], float), np.asarray(table["max_distance"], float)
+        invalid |= (most > least) & ((distance < least) | (distance > most))
+    return {**table, "current_distance": np.where(invalid, np.nan, distance)}
 
 
 def _motors(topics: dict) -> dict[str, Signal]:
