@@ -152,6 +152,14 @@ def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
         at.gap.measure(of_unknown, "crazyflie-2.1-flow")
 
 
+@pytest.mark.parametrize("function", [at.gap.measure, at.gap.diagnose])
+def test_logs_of_two_vehicles_need_one_to_be_named(log, function):
+    other = log.with_columns({}, vehicle="crazyflie-2.1-brushless")
+    for flights, baseline in (([log, other], ()), ([log], [other])):
+        with pytest.raises(AirTouchError, match="two vehicles: .* flew .*, crazyflie-2.1-brushless flew .*, or vehicle "):
+            function(flights, baseline=baseline)
+
+
 def test_a_log_without_a_vehicle_is_measured_as_the_default_with_a_warning(log):
     with pytest.warns(UserWarning, match="names no vehicle; crazyflie-2.1-flow is assumed, vehicle names another"):
         at.gap.measure(log.with_columns({}, vehicle=""))

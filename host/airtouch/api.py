@@ -177,11 +177,12 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
              report: str | Path | None = None, force: bool = False) -> "Diagnosis":
     """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
-    vehicle: a built-in name or .toml file; that of the first log if left out, and crazyflie-2.1-flow, with a warning,
-    where it names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
+    vehicle: a built-in name or .toml file; that of the logs if left out, and crazyflie-2.1-flow, with a warning,
+    where the first names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
     report: HTML file to write.
     The result's `plain()` is the JSON of `airtouch gap diagnose`.
-    Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
+    Raises AirTouchError for flights that cannot be used, for logs (the baseline's too) that name two vehicles where
+    none is given, and for a report that exists, without `force`.
     """
     import airtouch.gap.diagnosis as module
     from airtouch.logs.files import check_free
@@ -189,8 +190,8 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
 
     if report is not None:
         check_free(Path(report), force)
-    logs = _logs(flights)
-    diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), _logs(baseline), without=without,
+    logs, nominal = _logs(flights), _logs(baseline)
+    diagnosis = module.diagnose(logs, _vehicle(vehicle, [*logs, *nominal]), nominal, without=without,
                                 pictures=report is not None)
     if report is not None:
         gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
@@ -203,8 +204,8 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
     import airtouch.gap.measurement as module
 
-    logs = _logs(flights)
-    return module.measure(logs, _vehicle(vehicle, logs), _logs(baseline))
+    logs, nominal = _logs(flights), _logs(baseline)
+    return module.measure(logs, _vehicle(vehicle, [*logs, *nominal]), nominal)
 
 
 @in_python
@@ -292,11 +293,11 @@ def _check_speed(speed_mps: float | None) -> None:
 
 
 def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
-    """The named vehicle, or that of the first log for None, with a warning where it was assumed."""
+    """The named vehicle, or that of the logs for None, with a warning where it was assumed."""
     from airtouch import vehicle as vehicles
 
     if named is None:
-        craft, warning = vehicles.of_log(logs[0].meta if logs else {})
+        craft, warning = vehicles.of_logs(logs)
         if warning:
             warnings.warn(python_words(warning), stacklevel=_caller_level())
         return craft
