@@ -156,7 +156,7 @@ def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
 def test_logs_of_two_vehicles_need_one_to_be_named(log, function):
     other = log.with_columns({}, vehicle="crazyflie-2.1-brushless")
     for flights, baseline in (([log, other], ()), ([log], [other])):
-        with pytest.raises(AirTouchError, match="two vehicles: .* flew .*, crazyflie-2.1-brushless flew .*, or vehicle "):
+        with pytest.raises(AirTouchError, match="two vehicles: .* flew .*, crazyflie-2.1-brushless flew .*, or vehi"):
             function(flights, baseline=baseline)
 
 

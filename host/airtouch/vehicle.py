@@ -1,5 +1,6 @@
 """A vehicle: mass, geometry, thrust curve and noise, read from a TOML file."""
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from importlib import resources
@@ -124,7 +125,7 @@ def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
     """
     name = str(meta.get("vehicle") or "")
     if unknown_name(meta):
-        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, of which no file is known; {DEFAULT_VEHICLE} "
+        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, {why_unknown(name)}; {DEFAULT_VEHICLE} "
                                        "is used, --vehicle names another")
     craft = load(name or DEFAULT_VEHICLE)
     assumed = not name or meta.get("assumed_vehicle") == name
@@ -150,13 +151,23 @@ def of_logs(logs: Iterable[FlightLog]) -> tuple[Vehicle, str | None]:
 
 
 def unknown_name(meta: Mapping[str, Any]) -> str:
-    """The vehicle that a log's metadata name where no file is known of it, else ""."""
+    """The vehicle that a log's metadata name where it cannot be loaded (`why_unknown`), else ""."""
     name = str(meta.get("vehicle") or "")
     try:
         load(name or DEFAULT_VEHICLE)
     except AirTouchError:
         return name
     return ""
+
+
+def why_unknown(name: str) -> str:
+    """What is wrong with a name that `unknown_name` gave: no file is known of it, or what is wrong in its file."""
+    if name.endswith(".toml") and os.path.isfile(name):
+        try:
+            load(name)
+        except AirTouchError as error:
+            return f"whose file is wrong ({error})"
+    return "of which no file is known"
 
 
 def parse(text: str, source: str) -> Vehicle:

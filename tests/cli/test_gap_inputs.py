@@ -107,7 +107,8 @@ def test_flights_of_two_vehicles_need_one_to_be_named(generated, tmp_path, comma
              "SECOND": renamed(source, tmp_path / "b.csv", vehicle="crazyflie-2.1-brushless"),
              "UNNAMED": renamed(source, tmp_path / "c.csv", vehicle="")}
     with pytest.raises(AirTouchError) as error:
-        CliRunner().invoke(command, [names.get(w, w) for w in call.split()], catch_exceptions=False, standalone_mode=False)
+        CliRunner().invoke(command, [names.get(w, w) for w in call.split()], catch_exceptions=False,
+                           standalone_mode=False)
     said = str(error.value)
     assert "crazyflie-2.1-flow flew " in said and "crazyflie-2.1-brushless flew " in said and "--vehicle" in said
     assert "a.csv" in said and "b.csv" in said and "\n" not in said
