@@ -2,7 +2,8 @@
 
 `at.read`, `at.write`, `at.to_pandas`, `at.from_pandas`, `at.detect`, `at.evaluate`, `at.simulate`, `at.adapt`,
 `at.gap.diagnose` and `at.gap.measure`. A flight is a file name, a `FlightLog` or a pandas table with the log's column
-names. Heavy modules are imported at their first use, so `import airtouch` is fast.
+names; `at.adapt` takes files and folders alone. Heavy modules are imported at their first use, so `import airtouch` is
+fast.
 """
 
 import numbers
@@ -218,7 +219,8 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     this fit starts from. speed_mps: commanded speed, if no manifest states it. hold_out: also measure the errors by
     cross-validation. progress: called as progress(stage, done, total, note), since this takes minutes. The result's
     `plain()` says what was done. Raises AirTouchError without the extra 'train', without a flight that crosses an edge,
-    for a twin and a vehicle together, and for an `out` that exists, without `force`.
+    for a log or table in place of a file, for a twin and a vehicle together, and for an `out` that exists, without
+    `force`.
     """
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
@@ -234,7 +236,10 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     check_free(out, force)
     if twin is not None and vehicle is not None:
         raise AirTouchError("a twin has a vehicle of its own; leave vehicle out")
-    usable, left_out = adapt_report.readable(dataset.collect(_several(flights), speed_mps))
+    files = _several(flights)
+    if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
+        raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
+    usable, left_out = adapt_report.readable(dataset.collect(files, speed_mps))
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
