@@ -127,6 +127,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     from airtouch.detector.evaluation import evaluate as scoring
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
+    from airtouch.detector.evaluation.score import FlightScore
 
     _check_speed(speed_mps)
     module, inputs = registry.get(detector), _several(flights)
@@ -134,16 +135,25 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
         raise AirTouchError("no flight to score")
     trained = module.load(Path(model) if model else None)
     paths = [f for f in inputs if isinstance(f, (str, Path))]
-    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
+    noted: list[tuple[FlightScore, list[str]]] = []
+
+    def note(result: scoring.Result | AirTouchError) -> None:
+        if isinstance(result, scoring.Result):
+            noted.append((result.score, scoring.remarks(result.log)))
+
+    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained, note) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
         scoring.check(log, scoring.spare_of(module))
         if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
-        scores.append(scoring.evaluate_flight(file, log, module, trained).score)
+        result = scoring.evaluate_flight(file, log, module, trained)
+        note(result)
+        scores.append(result.score)
     name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
     left_out = [(file, python_words(reason)) for file, reason in left_out]
-    return scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
+    table = scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
+    return table | {"remarks": scoring.remarks_by_flight(noted, scores, left_out)}
 
 
 @in_python
