@@ -152,6 +152,21 @@ def test_a_log_of_an_unknown_vehicle_is_measured_with_a_warning(log):
         at.gap.measure(of_unknown, "crazyflie-2.1-flow")
 
 
+def test_adapt_takes_files_alone(log, tmp_path):
+    pytest.importorskip("tensorflow")
+    for flights, kind in (([log], "FlightLog"), (log, "FlightLog"), ([tmp_path, at.to_pandas(log)], "DataFrame")):
+        with pytest.raises(AirTouchError, match=f"files or folders, not {kind}"):
+            at.adapt(flights, tmp_path / "mine.npz")
+
+
+@pytest.mark.parametrize("function", [at.gap.measure, at.gap.diagnose])
+def test_logs_of_two_vehicles_need_one_to_be_named(log, function):
+    other = log.with_columns({}, vehicle="crazyflie-2.1-brushless")
+    for flights, baseline in (([log, other], ()), ([log], [other])):
+        with pytest.raises(AirTouchError, match="two vehicles: .* flew .*, crazyflie-2.1-brushless flew .*, or vehi"):
+            function(flights, baseline=baseline)
+
+
 def test_a_log_without_a_vehicle_is_measured_as_the_default_with_a_warning(log):
     with pytest.warns(UserWarning, match="names no vehicle; crazyflie-2.1-flow is assumed, vehicle names another"):
         at.gap.measure(log.with_columns({}, vehicle=""))

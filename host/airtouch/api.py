@@ -2,7 +2,8 @@
 
 `at.read`, `at.write`, `at.to_pandas`, `at.from_pandas`, `at.detect`, `at.evaluate`, `at.simulate`, `at.adapt`,
 `at.gap.diagnose` and `at.gap.measure`. A flight is a file name, a `FlightLog` or a pandas table with the log's column
-names. Heavy modules are imported at their first use, so `import airtouch` is fast.
+names; `at.adapt` takes files and folders alone. Heavy modules are imported at their first use, so `import airtouch` is
+fast.
 """
 
 import numbers
@@ -126,6 +127,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     from airtouch.detector.evaluation import evaluate as scoring
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
+    from airtouch.detector.evaluation.score import FlightScore
 
     _check_speed(speed_mps)
     module, inputs = registry.get(detector), _several(flights)
@@ -133,16 +135,25 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
         raise AirTouchError("no flight to score")
     trained = module.load(Path(model) if model else None)
     paths = [f for f in inputs if isinstance(f, (str, Path))]
-    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained) if paths else ([], [])
+    noted: list[tuple[FlightScore, list[str]]] = []
+
+    def note(result: scoring.Result | AirTouchError) -> None:
+        if isinstance(result, scoring.Result):
+            noted.append((result.score, scoring.remarks(result.log)))
+
+    scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained, note) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
         scoring.check(log, scoring.spare_of(module))
         if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
-        scores.append(scoring.evaluate_flight(file, log, module, trained).score)
+        result = scoring.evaluate_flight(file, log, module, trained)
+        note(result)
+        scores.append(result.score)
     name = detector if isinstance(detector, str) else getattr(detector, "__name__", type(detector).__name__)
     left_out = [(file, python_words(reason)) for file, reason in left_out]
-    return scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
+    table = scoring.as_json(name, scores, left_out, module.lag_s(trained), module.parameters(trained))
+    return table | {"remarks": scoring.remarks_by_flight(noted, scores, left_out)}
 
 
 @in_python
@@ -177,11 +188,12 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
              report: str | Path | None = None, force: bool = False) -> "Diagnosis":
     """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
-    vehicle: a built-in name or .toml file; that of the first log if left out, and crazyflie-2.1-flow, with a warning,
-    where it names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
+    vehicle: a built-in name or .toml file; that of the logs if left out, and crazyflie-2.1-flow, with a warning,
+    where the first names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
     report: HTML file to write.
     The result's `plain()` is the JSON of `airtouch gap diagnose`.
-    Raises AirTouchError for flights that cannot be used and for a report that exists, without `force`.
+    Raises AirTouchError for flights that cannot be used, for logs (the baseline's too) that name two vehicles where
+    none is given, and for a report that exists, without `force`.
     """
     import airtouch.gap.diagnosis as module
     from airtouch.logs.files import check_free
@@ -189,8 +201,8 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
 
     if report is not None:
         check_free(Path(report), force)
-    logs = _logs(flights)
-    diagnosis = module.diagnose(logs, _vehicle(vehicle, logs), _logs(baseline), without=without,
+    logs, nominal = _logs(flights), _logs(baseline)
+    diagnosis = module.diagnose(logs, _vehicle(vehicle, [*logs, *nominal]), nominal, without=without,
                                 pictures=report is not None)
     if report is not None:
         gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
@@ -203,8 +215,8 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
     import airtouch.gap.measurement as module
 
-    logs = _logs(flights)
-    return module.measure(logs, _vehicle(vehicle, logs), _logs(baseline))
+    logs, nominal = _logs(flights), _logs(baseline)
+    return module.measure(logs, _vehicle(vehicle, [*logs, *nominal]), nominal)
 
 
 @in_python
@@ -217,7 +229,8 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     this fit starts from. speed_mps: commanded speed, if no manifest states it. hold_out: also measure the errors by
     cross-validation. progress: called as progress(stage, done, total, note), since this takes minutes. The result's
     `plain()` says what was done. Raises AirTouchError without the extra 'train', without a flight that crosses an edge,
-    for a twin and a vehicle together, and for an `out` that exists, without `force`.
+    for a log or table in place of a file, for a twin and a vehicle together, and for an `out` that exists, without
+    `force`.
     """
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
@@ -233,7 +246,10 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     check_free(out, force)
     if twin is not None and vehicle is not None:
         raise AirTouchError("a twin has a vehicle of its own; leave vehicle out")
-    usable, left_out = adapt_report.readable(dataset.collect(_several(flights), speed_mps))
+    files = _several(flights)
+    if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
+        raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
+    usable, left_out = adapt_report.readable(dataset.collect(files, speed_mps))
     if not usable:
         raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
     work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
@@ -292,11 +308,11 @@ def _check_speed(speed_mps: float | None) -> None:
 
 
 def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
-    """The named vehicle, or that of the first log for None, with a warning where it was assumed."""
+    """The named vehicle, or that of the logs for None, with a warning where it was assumed."""
     from airtouch import vehicle as vehicles
 
     if named is None:
-        craft, warning = vehicles.of_log(logs[0].meta if logs else {})
+        craft, warning = vehicles.of_logs(logs)
         if warning:
             warnings.warn(python_words(warning), stacklevel=_caller_level())
         return craft

@@ -36,7 +36,8 @@ class Parameters:
     alert_hold: int = 50
     #: decoding: airborne while the mean PWM is above this, 0 to 65535. Project: a round number without a source; it
     #: lifts 23 % of the weight of crazyflie-2.1-flow. Of a vehicle with its own (crazyflie-2.1-brushless) the app and
-    #: the pipeline of `paper` take that one; `logs.airborne` and `best` take this one
+    #: the pipeline of `paper` take that one, and `best` that of the vehicle that it was trained for (`train
+    #: --vehicle`), of the others this one; `logs.airborne` takes this one
     arm_pwm: float = 15000.0
     #: decoding: airborne for so long before an edge can be reported, samples. Project: a round number without a
     #: source, 1 s

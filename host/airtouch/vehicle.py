@@ -1,6 +1,7 @@
 """A vehicle: mass, geometry, thrust curve and noise, read from a TOML file."""
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from importlib import resources
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from airtouch import tables
 from airtouch.errors import AirTouchError, printable, unknown
+from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
 
 
@@ -123,21 +125,49 @@ def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
     """
     name = str(meta.get("vehicle") or "")
     if unknown_name(meta):
-        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, of which no file is known; {DEFAULT_VEHICLE} "
+        return load(DEFAULT_VEHICLE), (f"the log names vehicle {name!r}, {why_unknown(name)}; {DEFAULT_VEHICLE} "
                                        "is used, --vehicle names another")
     craft = load(name or DEFAULT_VEHICLE)
     assumed = not name or meta.get("assumed_vehicle") == name
     return craft, f"the log names no vehicle; {craft.name} is assumed, --vehicle names another" if assumed else None
 
 
+def of_logs(logs: Iterable[FlightLog]) -> tuple[Vehicle, str | None]:
+    """The vehicle of flights of one vehicle: `of_log` of the first of them.
+
+    Raises AirTouchError where two logs name different vehicles; a name that the reader assumed is none.
+    """
+    first: Mapping[str, Any] | None = None
+    named: dict[str, str] = {}
+    for log in logs:
+        first = log.meta if first is None else first
+        name = str(log.meta.get("vehicle") or "")
+        if name and log.meta.get("assumed_vehicle") != name:
+            named.setdefault(name, log.source)
+    if len(named) > 1:
+        pairs = [f"{name} flew {source}" for name, source in list(named.items())[:2]]
+        raise AirTouchError(f"two vehicles: {', '.join(pairs)}; give flights of one, or --vehicle for all of them")
+    return of_log(first or {})
+
+
 def unknown_name(meta: Mapping[str, Any]) -> str:
-    """The vehicle that a log's metadata name where no file is known of it, else ""."""
+    """The vehicle that a log's metadata name where it cannot be loaded (`why_unknown`), else ""."""
     name = str(meta.get("vehicle") or "")
     try:
         load(name or DEFAULT_VEHICLE)
     except AirTouchError:
         return name
     return ""
+
+
+def why_unknown(name: str) -> str:
+    """What is wrong with a name that `unknown_name` gave: no file is known of it, or what is wrong in its file."""
+    if name.endswith(".toml") and os.path.isfile(name):
+        try:
+            load(name)
+        except AirTouchError as error:
+            return f"whose file is wrong ({error})"
+    return "of which no file is known"
 
 
 def parse(text: str, source: str) -> Vehicle:

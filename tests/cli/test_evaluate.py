@@ -177,4 +177,9 @@ def test_remarks_on_flights_of_one_name_in_two_folders_are_both_there(generated,
     for chosen, keys in ((paths, {str(path) for path in paths}), (paths[:1], {"f.csv"})):
         result = run(*chosen, "--detector", "baseline", "--speed", 0.3, "--json", tmp_path / "o.json", "--force")
         assert result.exit_code == 0, result.output
-        assert set(json.loads((tmp_path / "o.json").read_text())["remarks"]) == keys
+        written = json.loads((tmp_path / "o.json").read_text())
+        assert set(written["remarks"]) == keys and "1 times" in str(written["remarks"])
+        in_python = at.evaluate(chosen, "baseline", speed_mps=0.3)
+        assert in_python.keys() == written.keys() and in_python["remarks"] == written["remarks"]
+    in_memory = at.evaluate(logs.read(paths[0]), "baseline", speed_mps=0.3)
+    assert in_memory["remarks"] == {"f.csv": written["remarks"]["f.csv"]}

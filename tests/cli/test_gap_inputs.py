@@ -6,8 +6,11 @@ import pytest
 from click.testing import CliRunner
 
 import made_diagnosis
+from airtouch import logs
+from airtouch.cli.gap import files
 from airtouch.cli.gap.blind import blind_run
 from airtouch.cli.gap.diagnose import diagnose_command
+from airtouch.cli.gap.measure import measure_command
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
@@ -86,3 +89,39 @@ def test_the_figures_of_a_check_are_not_replaced(tmp_path):
         result = CliRunner().invoke(blind_run, [str(tmp_path / out), *option])
         assert "exists already" in str(result.exception)
     assert {p.read_text() for p in tmp_path.glob("*.json")} == {"mine"} and not (tmp_path / "check").exists()
+
+
+def renamed(source, path, **meta):
+    """A copy of a log with other metadata."""
+    logs.write(logs.read(source).with_columns({}, **meta), path)
+    return str(path)
+
+
+@pytest.mark.parametrize("command, call", [
+    (diagnose_command, "FIRST SECOND"), (diagnose_command, "FIRST SECOND --each"),
+    (diagnose_command, "UNNAMED FIRST --baseline SECOND"), (measure_command, "FIRST SECOND"),
+    (measure_command, "FIRST --baseline SECOND")])
+def test_flights_of_two_vehicles_need_one_to_be_named(generated, tmp_path, command, call):
+    source = generated / "f0.csv.gz"
+    names = {"FIRST": renamed(source, tmp_path / "a.csv", vehicle="crazyflie-2.1-flow"),
+             "SECOND": renamed(source, tmp_path / "b.csv", vehicle="crazyflie-2.1-brushless"),
+             "UNNAMED": renamed(source, tmp_path / "c.csv", vehicle="")}
+    with pytest.raises(AirTouchError) as error:
+        CliRunner().invoke(command, [names.get(w, w) for w in call.split()], catch_exceptions=False,
+                           standalone_mode=False)
+    said = str(error.value)
+    assert "crazyflie-2.1-flow flew " in said and "crazyflie-2.1-brushless flew " in said and "--vehicle" in said
+    assert "a.csv" in said and "b.csv" in said and "\n" not in said
+
+
+@pytest.mark.parametrize("meta", [{"vehicle": ""}, {"vehicle": "crazyflie-2.1", "assumed_vehicle": "crazyflie-2.1"}])
+def test_a_log_without_a_name_of_its_own_goes_with_any_vehicle(generated, tmp_path, meta):
+    named = renamed(generated / "f0.csv.gz", tmp_path / "a.csv", vehicle="crazyflie-2.1-brushless")
+    other = renamed(generated / "f0.csv.gz", tmp_path / "b.csv", **meta)
+    assert files.vehicle_of(None, files.Flights([named]), files.Flights([other])).name == "crazyflie-2.1-brushless"
+
+
+def test_a_named_vehicle_is_taken_for_logs_of_two(generated, tmp_path):
+    both = [renamed(generated / "f0.csv.gz", tmp_path / f"{name}.csv", vehicle=name)
+            for name in ("crazyflie-2.1", "crazyflie-2.1-flow")]
+    assert files.vehicle_of("crazyflie-2.1-brushless", files.Flights(both)).name == "crazyflie-2.1-brushless"

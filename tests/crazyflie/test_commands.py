@@ -3,11 +3,13 @@
 import re
 import signal
 import threading
+from importlib import resources
 from unittest.mock import Mock
 
 import pytest
 from click.testing import CliRunner
 
+from airtouch import vehicle
 from airtouch.cli import airtouch
 from airtouch.cli.drone import collect as cli_collect
 from airtouch.crazyflie import collect, mission, readiness, recorder
@@ -45,6 +47,29 @@ def test_without_a_drone_no_empty_folder_stays(tmp_path, monkeypatch):
     for out in (tmp_path / "flights", tmp_path / "mine" / "a" / "b", tmp_path / "mine"):
         assert refusal("collect", "--out", out, "--uri", "x", "--mission", "sweep") == "nobody answers"
     assert list(tmp_path.rglob("*")) == [tmp_path / "mine"]
+
+
+@pytest.mark.parametrize("text, reason", [(None, "no such vehicle file"), ("mas_kg = 1.0", "unknown key mas_kg")])
+def test_a_vehicle_that_cannot_be_loaded_is_told_before_connecting(tmp_path, monkeypatch, text, reason):
+    monkeypatch.setattr("airtouch.crazyflie.connection.drone.Drone", Mock(side_effect=AssertionError("connected")))
+    flown = ("collect", "--out", tmp_path / "flights", "--uri", "x", "--mission", "sweep", "--vehicle")
+    assert "'crazyflie-2.1-flwo'" in refusal(*flown, "crazyflie-2.1-flwo")
+    if text:
+        (tmp_path / "mine.toml").write_text(text)
+    assert reason in refusal(*flown, tmp_path / "mine.toml")
+    assert not (tmp_path / "flights").exists()
+
+
+@pytest.mark.parametrize("named", ["mine.toml", "crazyflie-2.1"])
+def test_the_log_names_a_vehicle_that_is_found_from_any_folder(tmp_path, monkeypatch, named):
+    (tmp_path / "mine.toml").write_text((resources.files("airtouch") / "vehicles" / "crazyflie-2.1.toml").read_text())
+    (tmp_path / "elsewhere").mkdir()
+    plans = []
+    monkeypatch.setattr(cli_collect, "_fly", lambda plan, *_, **__: plans.append(plan) or True)
+    monkeypatch.chdir(tmp_path)
+    assert run("collect", "--out", "flights", "--uri", "x", "--mission", "sweep", "--vehicle", named).exit_code == 0
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert vehicle.of_log({"vehicle": plans[0].vehicle}) == (vehicle.load("crazyflie-2.1"), None)
 
 
 def test_a_folder_that_holds_something_stays(tmp_path):

@@ -2,6 +2,8 @@
 
 import csv
 import json
+import os
+import subprocess
 import sys
 import types
 from functools import partial
@@ -53,6 +55,31 @@ def test_what_is_missing_is_said_and_the_others_are_made(figures, tmp_path):
     assert {c["verdict"] for name in ("fig8e", "table1") for c in verdicts[name]["claims"].values()} == {UNTESTABLE}
     page = (out / "index.html").read_text()
     assert "n = 1 &lt;of 3&gt;" in page and "Not made: no recorded flights" in page and "0.364" not in page
+
+
+def test_one_process_has_one_thread_too_before_tensorflow_is_imported(tmp_path):
+    """In a process of its own: figures of one group are made by the process that was started."""
+    code = f"""
+import sys, types
+from pathlib import Path
+from airtouch.paper_figures import run
+from airtouch.paper_figures.figure import Figure, Job, Missing
+
+def threads(job):
+    print("before", "tensorflow" in sys.modules)
+    import os
+    print("TF", os.environ["TF_NUM_INTRAOP_THREADS"], os.environ["TF_NUM_INTEROP_THREADS"])
+    raise Missing("of no matter")
+
+module = types.ModuleType("airtouch.paper_figures.figures.made_up")
+module.threads = threads
+sys.modules[module.__name__] = module
+run.FIGURES = {{"fig8e": ("made_up", "threads")}}
+run.run(["fig8e"], Path({str(tmp_path)!r}), Job(None, Path({str(tmp_path)!r}) / "work"))
+"""
+    environment = {k: v for k, v in os.environ.items() if k not in run.ONE_THREAD}
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert "before False" in out.stdout and "TF 1 1" in out.stdout
 
 
 def test_the_page_says_what_is_judged_and_by_which_margins(figures, tmp_path, monkeypatch):

@@ -1,10 +1,16 @@
 """When an error counts as reached."""
 
+import numpy as np
+
+from airtouch.detector.evaluation.data.dataset import Condition
+from airtouch.detector.evaluation.score import score_flight
+from airtouch.detector.evaluation.summary import summarise
+from airtouch.detector.trace import Trace
 from airtouch.paper_figures import words
 
 
-def row(error, low, missed, high=9.0):
-    return {"mean_abs_error_m": error, "missed": missed,
+def row(error, low, missed, high=9.0, edges=20):
+    return {"edges": edges, "mean_abs_error_m": error, "missed": missed,
             "intervals": {"mean_abs_error_m": low and (low, high), "missed": (missed, missed)}}
 
 
@@ -15,6 +21,11 @@ def test_an_error_is_reached_by_a_narrow_interval_and_with_few_misses_alone():
     assert words.reaches(row(0.01, 0.005, 0.66, 0.02), 0.03) is False
     assert words.reaches(row(None, None, 1.0), 0.03) is False
     assert words.reaches(row(0.02, None, 0.0), 0.03) is None  # of one flight
+
+
+def test_flights_without_an_edge_decide_nothing():
+    scores = [score_flight("f.csv", Condition(), [], np.ones(500, dtype=bool), Trace(np.zeros(500), []), 0.0)]
+    assert words.reaches(summarise(scores), 0.03) is None
 
 
 def test_two_wide_intervals_are_not_the_same():

@@ -1,7 +1,6 @@
 """`airtouch evaluate`: score a detector on flights."""
 
 import sys
-from collections import Counter
 from pathlib import Path
 
 import click
@@ -13,6 +12,7 @@ from airtouch.detector import registry
 from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.data import folds as folds_of
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.logs.files import check_free
 
 
@@ -46,18 +46,17 @@ def command(flights: tuple[Path, ...], detector: str, model: Path | None, speed:
     if reasons.total():
         click.echo(f"airtouch: {len(files)} flights are scored, {reasons.total()} are not: "
                    + ", ".join(f"{count} {reason}" for reason, count in (+reasons).items()), err=True)
-    remarks: dict[str, list[str]] = {}
-    same_name = Counter(file.path.name for file in files)
+    noted: list[tuple[FlightScore, list[str]]] = []
     with click.progressbar(length=len(files), label="flights", file=sys.stderr) as bar:
         def done(result: evaluate.Result | Exception) -> None:
             if isinstance(result, Exception):
                 click.echo(f"\rairtouch: {result}", err=True)
-            elif lines := evaluate.remarks(result.log):
-                score = result.score
-                remarks[score.file if same_name[score.file] == 1 else score.path] = lines
+            else:
+                noted.append((result.score, evaluate.remarks(result.log)))
             bar.update(1)
 
         scores, failures = evaluate.evaluate(files, module, trained, done)
+    remarks = evaluate.remarks_by_flight(noted, scores, failures)
     _print_remarks(remarks)
     result = evaluate.as_json(detector, scores, failures, module.lag_s(trained), module.parameters(trained))
     result["remarks"] = remarks

@@ -11,6 +11,7 @@ from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
+from airtouch.logs.formats.rosbag import is_bag
 
 
 @click.command(name="map")
@@ -46,7 +47,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     picture = out.with_suffix(".png")
     for path in (out, picture):
         check_free(path, force)
-    if flight.is_dir():
+    if flight.is_dir() and not is_bag(flight):
         raise AirTouchError(f"{flight}: a folder; a map is of one flight, name its log")
     (file,) = dataset.collect([flight], speed)
     log = logs.read(flight)

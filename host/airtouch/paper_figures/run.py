@@ -68,6 +68,8 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
             if entry and name in same and "missing" not in entry and not force]
     for name in done:
         job.tell(f"{name}: done before")
+    for variable in ONE_THREAD:  # TensorFlow, imported by the figures, reads them
+        os.environ.setdefault(variable, "1")
     undone = [name for name in chosen if name not in done]
     groups = [part for group in GROUPS if (part := [name for name in undone if name in group])]
     if workers == 1 or len(groups) < 2:
@@ -96,8 +98,6 @@ def make_all(chosen: Sequence[str], job: Job, out: Path, command: str) -> None:
 
 def _make_in_processes(groups: Sequence[Sequence[str]], job: Job, out: Path, command: str, workers: int) -> None:
     """`make_all` for each group, in processes."""
-    for variable in ONE_THREAD:
-        os.environ.setdefault(variable, "1")
     context = multiprocessing.get_context("spawn")  # a forked TensorFlow hangs
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
         futures = [pool.submit(make_all, group, job, out, command) for group in groups]

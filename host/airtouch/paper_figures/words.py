@@ -44,8 +44,11 @@ def score(row: Mapping[str, Any]) -> str:
 def reaches(row: Mapping[str, Any], error_m: float) -> bool | None:
     """Whether the mean error is as small as the paper's, with MOST_MISSED missed at most; None for undecided.
 
-    Yes: the 95 % interval ends within ERROR_MARGIN above the paper's error. No: it begins above the paper's error.
+    Yes: the 95 % interval ends within ERROR_MARGIN above the paper's error. No: it begins above the paper's error, or
+    every edge is missed. Flights without an edge say neither.
     """
+    if not row["edges"]:
+        return None
     interval, value = row["intervals"]["mean_abs_error_m"], row["mean_abs_error_m"]
     if value is None or row["missed"] > MOST_MISSED or (interval or (value,))[0] > error_m:
         return False

@@ -1,6 +1,7 @@
 """Files of PX4 and ROS 2, written by pyulog and rosbags, and CSVs of others by a map."""
 
 import csv
+import re
 import struct
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs
+from airtouch.cli import airtouch
 from airtouch.cli.logs import command
+from airtouch.detector.evaluation.data import dataset
 from airtouch.errors import AirTouchError
 from airtouch.logs.formats import mapped, ulog
 
@@ -161,6 +164,26 @@ def test_a_ros_bag_is_read_by_message_type(bag):
         assert log[name][row] == pytest.approx(value, abs=1e-9), name
     result = run("info", bag)
     assert result.exit_code == 0 and "rosbag2" in result.output
+
+
+@pytest.mark.parametrize("name", ["evaluate", "replay", "map"])
+def test_a_command_that_takes_a_flight_takes_a_bag(bag, tmp_path, name):
+    """It says of the bag what it says of a CSV of the same samples, which is not that a folder is no flight."""
+    csv_file, written = tmp_path / "same.csv", str(tmp_path / "map.geojson")
+    options = ["--truth", "--out", written, "--force"] if name == "map" else []
+    logs.write(logs.read(bag), csv_file)
+    said = []
+    for path in (bag, csv_file):
+        result = CliRunner().invoke(airtouch, [name, str(path), *options])
+        said.append(re.sub(r"\S*/(bag|same.csv)", "FLIGHT", result.output + str(result.exception)))
+    assert said[0] == said[1] and "folder" not in said[0]
+
+
+def test_a_bag_has_the_condition_of_the_manifest_beside_it(bag):
+    (bag.parent / "manifest.csv").write_text("file,use,speed_mps\nbag,clean,0.3\n")
+    for named in (bag, bag.parent):
+        (file,) = dataset.collect([named])
+        assert file.path == bag and file.condition.speed_mps == 0.3
 
 
 @pytest.fixture

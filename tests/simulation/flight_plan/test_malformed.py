@@ -124,6 +124,13 @@ def test_a_vehicle_that_a_log_names_oddly_is_unknown(name):
     assert flown == vehicles.load() and "no file is known" in warning
 
 
+def test_a_log_whose_vehicle_file_is_wrong_is_told_what_is_wrong(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(tomli_w.dumps(CRAFT | {"mas_kg": 0.03}))
+    flown, warning = vehicles.of_log({"vehicle": str(path)})
+    assert flown == vehicles.load() and "unknown key mas_kg" in warning and "no file is known" not in warning
+
+
 @pytest.mark.parametrize("table", [{"acc_noise_rms_mps2": -0.1}, {"gyro_noise_ratio": [1, 1, -1]},
                                    {"gyro_bandwidth_hz": -1.0}, {"flow_noise_mps": [0.1, -0.1]}])
 def test_negative_noise_is_refused(table):

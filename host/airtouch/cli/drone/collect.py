@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from airtouch import vehicle as vehicles
 from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import check_free, no_empty_folders
-from airtouch.vehicle import DEFAULT_VEHICLE
 
 if TYPE_CHECKING:
     from airtouch.crazyflie import collect
@@ -42,7 +42,8 @@ def _list_missions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
               help="Number of flights; they are numbered after those in the folder.")
 @click.option("--number", type=click.IntRange(min=1),
               help="Number of the first flight, instead of the next free one.")
-@click.option("--vehicle", default=DEFAULT_VEHICLE, show_default=True, help="Written into the log.")
+@click.option("--vehicle", default=vehicles.DEFAULT_VEHICLE, show_default=True,
+              help="Built-in name or .toml file, written into the log.")
 @click.option("--param", "settings", multiple=True, metavar="GROUP.NAME=VALUE",
               help="Set a parameter of the drone first.")
 @click.option("--min-battery", type=Finite(min=0.0), default=3.7, show_default=True, metavar="V",
@@ -80,7 +81,7 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
     if flights < 1:
         raise AirTouchError("--flights must be 1 or more")
     name = name or Path(mission.scene_of(mission_name).name).name
-    plan = collect.Plan(uri, out, name, vehicle, [parse_setting(text) for text in settings], min_battery,
+    plan = collect.Plan(uri, out, name, _checked(vehicle), [parse_setting(text) for text in settings], min_battery,
                         link_timeout, force)
     with no_empty_folders(out):
         collect.prepare_folder(out, click.echo)
@@ -92,6 +93,15 @@ def command(uri: str | None, mission_name: str | None, out: Path, name: str | No
         click.echo(mission.describe_all(list(missions.values())))
         planned = _fly(plan, missions, cache, ask=sys.stdin.isatty() and not yes)
     sys.exit(0 if planned else 1)
+
+
+def _checked(vehicle: str) -> str:
+    """The vehicle as logs name it: a built-in name, or the absolute path of a file, so that it is found from anywhere.
+
+    Raises AirTouchError for an unknown name and for a wrong file.
+    """
+    vehicles.load(vehicle)
+    return str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
 
 
 def _recover(out: Path) -> None:

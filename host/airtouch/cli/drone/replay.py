@@ -38,9 +38,10 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     from airtouch.detector.evaluation import evaluate
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.shared import sensors
+    from airtouch.logs.formats.rosbag import is_bag
 
     files = dataset.collect([flight], flown_at)
-    if len(files) != 1 or flight.is_dir():
+    if len(files) != 1 or flight.is_dir() and not is_bag(flight):
         raise AirTouchError(f"{flight}: give one flight, not a folder")
     try:
         log = evaluate.read_flight(files[0], evaluate.spare_of(best))

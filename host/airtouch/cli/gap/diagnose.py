@@ -56,7 +56,9 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         for name in without:
             effects.get(name)
         flights, nominal, partners = files.Flights(real), files.Flights(baseline), files.Flights(partner)
-        case = _case(files.vehicle_of(vehicle_name, flights), list(nominal), without, list(partners))
+        nominal_logs = list(nominal)
+        craft = files.vehicle_of(vehicle_name, flights, nominal_logs)
+        case = _case(craft, nominal_logs, without, list(partners))
         if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
             click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
                        f"give it once ({len(same)} of {len(flights)} flights)", err=True)

@@ -1,7 +1,8 @@
 """Flights and vehicle that `airtouch gap` is given: files, folders, patterns."""
 
 import glob
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -68,12 +69,14 @@ def files_of(names: Sequence[str]) -> list[Path]:
     return list(files)
 
 
-def vehicle_of(named: str | None, flights: Flights) -> Vehicle:
-    """The vehicle named, else the one that the first log names, else the Crazyflie with flow deck."""
+def vehicle_of(named: str | None, flights: Flights, baseline: Iterable[FlightLog] = ()) -> Vehicle:
+    """The vehicle named, else the one that the logs name, else the Crazyflie with flow deck.
+
+    Raises AirTouchError where none is named and the logs, those of the baseline included, name two.
+    """
     if named:
         return vehicle.load(named)
-    first = next(iter(flights), None)
-    craft, warning = vehicle.of_log(first.meta if first is not None else {})
+    craft, warning = vehicle.of_logs(chain(flights, baseline))
     if warning:
         click.echo(f"airtouch: {warning}", err=True)
     return craft

@@ -29,7 +29,7 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
         from airtouch.gap.sealed import on_cluster
 
         flights, nominal = files.Flights(real), files.Flights(baseline)
-        vehicle = files.vehicle_of(vehicle_name, flights)
+        vehicle = files.vehicle_of(vehicle_name, flights, nominal)
         run = on_cluster.mapper(dask) if dask else map
         bar.expect(len(flights) + bool(baseline))
         measurement = measure.measure(flights, vehicle, nominal, progress=bar, mapper=run)

@@ -1,7 +1,9 @@
 """A detector over many flights: bad ones set aside, the others scored."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -96,6 +98,13 @@ def remarks(log: FlightLog) -> list[str]:
     back = int((clock_steps(log) < 0).sum())
     clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
     return [str(w) for w in log.meta.get("warnings", [])] + clock
+
+
+def remarks_by_flight(noted: Iterable[tuple[FlightScore, list[str]]], scores: Sequence[FlightScore],
+                      left_out: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
+    """Flight -> remarks, of flights that have any: by file name, by path where two flights share a name."""
+    names = Counter([score.file for score in scores] + [Path(path).name for path, _ in left_out])
+    return {score.file if names[score.file] == 1 else score.path: lines for score, lines in noted if lines}
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:

@@ -108,11 +108,11 @@ def _trace(log: FlightLog, model: Model, features: Features, probability: np.nda
 
 
 def _vehicle_note(log: FlightLog) -> str:
-    """A line where the log names a vehicle of which no file is known: the force is then the default's."""
+    """A line where the log names a vehicle that cannot be loaded: the force is then the default's."""
     name = vehicles.unknown_name(log.meta)
     if not name:
         return ""
-    return (f"the log names vehicle {printable(name)!r}, of which no file is known; the "
+    return (f"the log names vehicle {printable(name)!r}, {vehicles.why_unknown(name)}; the "
             f"disturbance force is that of {vehicles.DEFAULT_VEHICLE}")
 
 

@@ -96,7 +96,7 @@ def _parameters(n: _Counts) -> Verdict:
 def _memory() -> Verdict:
     camera, ring_bits = Camera(), 32 * 9 * DEFAULT.band_window
     frame_bits = 8 * camera.width * camera.height
-    return words.verdict(WINDOW_BITS <= CLAIMS["memory"].values[0] and frame_bits > 20 * WINDOW_BITS,
+    return words.verdict(WINDOW_BITS <= CLAIMS["memory"].values[0] and max(frame_bits, PAPER_FRAME_BITS) >= 1e6,
                          f"a window of features {WINDOW_BITS:,} bits, {ring_bits:,} with the samples of its band "
                          f"power; a frame of 324 x 244 {frame_bits:,} bits, of 320 x 320 {PAPER_FRAME_BITS:,}: less "
                          "than a million, not millions", "the paper's method and the camera")

@@ -11,6 +11,7 @@ from pathlib import Path
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import MANIFEST, flights_in, in_folder
 from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.formats.rosbag import is_bag
 
 MOST_MPS = 100.0  #: m/s, above any commanded speed
 
@@ -80,13 +81,14 @@ def collect(paths: Iterable[str | Path], speed_mps: float | None = None) -> list
     for path in map(Path, paths):
         if not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
-        folder = path if path.is_dir() else path.parent
+        is_folder = path.is_dir() and not is_bag(path)  # a bag is one flight
+        folder = path if is_folder else path.parent
         if folder not in manifests:
             manifest = folder / MANIFEST
             manifests[folder] = read_manifest(manifest) if manifest.is_file() else {}
         listed = manifests[folder]
         condition_of = {folder / name: condition for name, condition in listed.items()}
-        files = _flights_of(path, listed) if path.is_dir() else [path]
+        files = _flights_of(path, listed) if is_folder else [path]
         for file in files:
             condition = condition_of.get(file, Condition())
             if condition.day is None:
