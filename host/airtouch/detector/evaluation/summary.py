@@ -85,9 +85,9 @@ def breakdown(scores: Sequence[FlightScore], key: Callable[[FlightScore], str | 
 
 
 def _order(value: str) -> tuple[bool, float, str]:
-    """Numbers by value, before names."""
+    """Numbers by value, also those of centimetres, before names."""
     try:
-        return False, float(value), value
+        return False, float(value.removesuffix(" cm")), value
     except ValueError:
         return True, 0.0, value
 
@@ -100,15 +100,15 @@ def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:
 
 
 def by_centimetre(scores: Sequence[FlightScore]) -> dict[str, dict]:
-    """As `by_height`; heights in millimetres in whole centimetres, for simulated ones are drawn and all differ."""
+    """As `by_height`; heights such as "24mm" in whole centimetres, for simulated ones are drawn and all differ."""
     def rounded(score: FlightScore) -> FlightScore:
-        digits = (score.condition.height or "").removesuffix("mm")
-        if not digits.isdigit():
+        height = score.condition.height or ""
+        digits = height.removesuffix("mm")
+        if digits == height or not digits.isdigit():
             return score
-        return replace(score, condition=replace(score.condition, height=f"{(int(digits) + 5) // 10}"))
+        return replace(score, condition=replace(score.condition, height=f"{(int(digits) + 5) // 10} cm"))
 
-    groups = by_height([rounded(score) for score in scores])
-    return {f"{value} cm" if value.isdigit() else value: row for value, row in groups.items()}
+    return by_height([rounded(score) for score in scores])
 
 
 def by_angle(scores: Sequence[FlightScore]) -> dict[str, dict]:
