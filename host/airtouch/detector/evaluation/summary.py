@@ -1,5 +1,6 @@
 """Scores of many flights as one table, each figure with its interval."""
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -48,10 +49,13 @@ def paired(first: Sequence[FlightScore], second: Sequence[FlightScore], compare:
     """95 % intervals of what `compare` makes of two sets of scores of the same flights, each drawn for both at once.
 
     compare: the figures of `summarise` by name, shapes (...,), of the first and of the second -> name -> (...,).
-    Flights that one of them lacks are left out; None as in `bootstrap`.
+    Flights that one of them lacks are left out, with a warning; None as in `bootstrap`.
     """
     others = {s.flight: s for s in second}
     pairs = [(s, others[s.flight]) for s in first if s.flight in others]
+    if alone := len(first) + len(second) - 2 * len(pairs):
+        warnings.warn(f"{alone} of {len(first) + len(second)} scores have no score of the same flight beside them: the "
+                      "intervals leave them out", stacklevel=2)
     table = {f"{side} {key}": np.array([_totals(pair[side])[key] for pair in pairs], float)
              for side in (0, 1) for key in _totals_keys()}
 
