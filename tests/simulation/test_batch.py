@@ -57,7 +57,8 @@ def test_flights_do_not_depend_on_workers_or_batch():
 @pytest.mark.parametrize(("wrong", "message"), [
     ({"seed": -1}, "seed must be a whole number, 0 or more, not -1"),
     ({"workers": 0}, "workers must be a whole number, 1"),
-    ({"count": -3}, "the number of flights must be"), ({"effects": {"nope": {}}}, "no effect 'nope'"),
+    ({"count": -3}, "the number of flights must be"), ({"count": [0, -1]}, "a flight's number must be"),
+    ({"count": np.array([0.5])}, "a flight's number must be"), ({"effects": {"nope": {}}}, "no effect 'nope'"),
     ({"effects": {"wind": {"x": 1e9}}}, "wind: x"), ({"without": ["nope"]}, "no effect 'nope'")])
 def test_bad_input_is_refused_at_the_call(wrong, message):
     with pytest.raises(AirTouchError) as error:

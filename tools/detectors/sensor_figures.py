@@ -28,12 +28,14 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
     """The figures that the notes use. Raises AirTouchError for another file, and for flights that the model knew."""
     try:
         table = json.loads(path.read_text())
-        if table.get("in_training"):
-            raise AirTouchError(f"{path}: the model was trained on these flights; score others")
-        return {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
+        known = table.get("in_training")
+        wanted = {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
     except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise AirTouchError(f"{path}: not the JSON of tools/detectors/choose_decoder.py or `airtouch evaluate`: "
                             f"{error}") from None
+    if known:
+        raise AirTouchError(f"{path}: the model was trained on these flights; score others")
+    return wanted
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
 """Many flights: deterministic per seed whatever the number of workers, bounded memory."""
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Sized
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -30,12 +30,16 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     scenario, vehicle: objects, built-in names or .toml paths. count: how many flights, or
     their numbers. A flight depends on (scenario, vehicle, effects, without, seed, its
     number) only. workers: threads (the loop runs outside Python's lock); default one a core.
-    Raises AirTouchError for bad input at the call, before the first flight.
+    Raises AirTouchError for bad input at the call, before the first flight; for a wrong number that an iterator
+    yields, when it comes.
     """
     scene = scenario if isinstance(scenario, Scenario) else scenarios.load(scenario)
     craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
     if isinstance(count, (int, np.integer)):
         count = range(_whole(count, "the number of flights"))
+    elif isinstance(count, Sized):
+        for number in count:
+            _whole(number, "a flight's number")
     numbers = (_whole(number, "a flight's number") for number in count)
     seed = _whole(seed, "seed")
     workers = available_cores() if workers is None else _whole(workers, "workers", 1)

@@ -93,6 +93,12 @@ def test_heights_that_were_drawn_are_grouped_by_centimetre():
     assert list(groups) == ["2 cm", "10 cm", "low"]
 
 
+def test_classes_that_are_numbers_keep_their_names():
+    groups = by_centimetre([replace(flight([]), condition=Condition(height=h)) for h in ("2", "85", "24mm", "100mm")])
+    assert sorted(groups) == ["10 cm", "2", "2 cm", "85"]
+    assert all(row["flights"] == 1 for row in groups.values())
+
+
 def test_half_a_centimetre_is_rounded_up():
     groups = by_centimetre([replace(flight([]), condition=Condition(height=f"{h}mm")) for h in (15, 25, 35)])
     assert list(groups) == ["2 cm", "3 cm", "4 cm"]

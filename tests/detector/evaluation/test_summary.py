@@ -1,11 +1,13 @@
 """Scores of several models on the same flights, as one a flight."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
-from airtouch.detector.evaluation.summary import one_a_flight, summarise
+from airtouch.detector.evaluation.summary import one_a_flight, paired, summarise
 
 
 def test_draws_of_a_flight_add_up():
@@ -44,6 +46,28 @@ def test_flights_of_one_name_in_two_folders_are_two():
     scores = [FlightScore("f.csv", Condition(), (), (), 1, 10.0, path=path) for path in ("a/f.csv", "b/f.csv")]
     assert len(one_a_flight([*scores, *scores])) == 2
     assert len(one_a_flight([FlightScore.from_dict(score.as_dict()) for score in (*scores, *scores)])) == 2
+
+
+def test_a_flight_is_one_however_its_path_is_typed(tmp_path, monkeypatch):
+    (tmp_path / "a").mkdir()
+    monkeypatch.chdir(tmp_path / "a")
+    typed = [FlightScore("f.csv", Condition(), (), (), 1, 10.0, path=path)
+             for path in ("f.csv", "./f.csv", "../a/f.csv", f"{tmp_path}/a/f.csv")]
+    assert len(one_a_flight(typed)) == 1
+    assert [score.as_dict()["path"] for score in typed][1:3] == ["./f.csv", "../a/f.csv"]
+
+
+def test_flights_without_a_partner_are_reported():
+    scores = _scores(1)
+
+    def compare(first, second):
+        return {"loss": first["missed"] - second["missed"]}
+
+    with pytest.warns(UserWarning, match="2 of 22 scores"):
+        assert paired(scores, scores[2:], compare)["loss"] == (0.0, 0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        paired(scores, scores[::-1], compare)
 
 
 def test_false_edges_stay_unknown_where_no_score_knows_the_truth():

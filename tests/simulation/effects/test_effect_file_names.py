@@ -87,6 +87,22 @@ def test_places_that_are_there_pass(place):
     names.check(text.replace("s[at.HEIGHT]", "s[at.POSITION + 2]") + CONSTANTS, "mine.py")
 
 
+@pytest.mark.parametrize("others", [
+    'Parameter(name="since", unit="s", default=8.0, low=0.0, high=100.0, neutral=None, source="")',
+    '*(Parameter(n, "s", 8.0, 0.0, 100.0, None, "") for n in ("since",))',
+    'Parameter("sin" + "ce", "s", 8.0, 0.0, 100.0, None, "")'])
+def test_names_by_keyword_and_computed_names_are_names(others):
+    text = FILE.replace('Parameter("since", "s", 8.0, 0.0, 100.0, None, "")', others)
+    names.check(text.replace("p[1]:", "p[2]:").replace('["lag"]', '["since"]'), "mine.py")
+
+
+def test_a_name_by_keyword_is_counted():
+    text = FILE.replace('Parameter("since", "s", 8.0,', 'Parameter(name="since", unit="s", default=8.0, low=')
+    text = text.replace('low= 0.0, 100.0, None, "")', 'low=0.0, high=100.0, neutral=None, source="")')
+    with pytest.raises(AirTouchError, match=r"p\[3\] does not exist; the last place is p\[2\]"):
+        names.check(text.replace("p[1]:", "p[3]:"), "mine.py")
+
+
 def test_a_file_that_is_no_text_is_one_line(tmp_path):
     from airtouch.cli.simulate import command
 

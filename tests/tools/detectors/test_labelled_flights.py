@@ -6,6 +6,7 @@ import pytest
 
 from airtouch import logs
 from airtouch.detector import best
+from airtouch.detector.evaluation import evaluate
 from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.score import EdgeScore, FlightScore
 from airtouch.errors import AirTouchError
@@ -54,6 +55,30 @@ def test_every_flight_is_scored_by_models_that_never_saw_it(house, tmp_path, mon
     assert [row.split(" | ")[1:3] for row in rows] == [["1", "4 / 8"], ["2", "4 / 8"], ["2", "4 / 8"]]
     run(monkeypatch, *call)
     assert len(trained) == 8, "what is done is not done again"
+
+
+@pytest.mark.parametrize("change", ["speed", "content", "version"])
+def test_scores_are_made_anew_when_what_they_depend_on_changes(house, tmp_path, monkeypatch, change):
+    start, scored, real = best.fit([made_flight(9)], recipe=SMALL), [], evaluate.evaluate_flight
+    start.save(tmp_path / "start.npz")
+    monkeypatch.setattr(best, "fit", lambda flights, **_: start)
+    monkeypatch.setattr(evaluate, "evaluate_flight", lambda file, *a: scored.append(file) or real(file, *a))
+    call = (house, "--start", tmp_path / "start.npz", "--by", "day", "--out", tmp_path / "out", "--labelled", 1,
+            "--draws", 1, "--seeds", 1, "--alone-steps", 0)
+    run(monkeypatch, *call)
+    run(monkeypatch, *call)
+    assert len(scored) == 8, "nothing is done twice"
+    manifest = house / "manifest.csv"
+    if change == "speed":
+        manifest.write_text(manifest.read_text().replace("0.3", "0.6"))
+    elif change == "content":
+        log = logs.read(house / "f0.csv")
+        log.columns["zrange_m"][50:150] -= 0.01
+        logs.write(log, house / "f0.csv", force=True)
+    else:
+        monkeypatch.setitem(labelled_flights.scores_of.__globals__, "__version__", "another")
+    run(monkeypatch, *call)
+    assert len(scored) == 16
 
 
 def test_flights_beside_are_learnt_with_half_of_the_crops(house, tmp_path, monkeypatch):

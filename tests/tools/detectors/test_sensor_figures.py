@@ -33,8 +33,9 @@ def test_the_notes_have_the_figures_that_they_name(score):
 
 
 def test_flights_that_the_model_knew_are_refused(score):
-    with pytest.raises(AirTouchError, match="was trained on these flights"):
-        sensor_figures.figures(score(in_training=True), "folds")
+    with pytest.raises(AirTouchError, match="was trained on these flights") as error:
+        sensor_figures.figures(score(in_training=["f.csv"]), "folds")
+    assert "not the JSON" not in str(error.value)
 
 
 def test_another_file_is_refused(tmp_path):

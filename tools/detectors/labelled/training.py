@@ -4,13 +4,13 @@ import argparse
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from airtouch import vehicle
+from airtouch import __version__, vehicle
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation import crossval, evaluate
@@ -58,6 +58,14 @@ def recorded_beside(folders: Sequence[Path], speed: float | None,
     return adapt.SimulatedFlights([sensors.without(readable[f.path], absent) for f in listed], [None] * len(listed))
 
 
+def identity(file: FlightFile, log: FlightLog) -> list[Any]:
+    """A flight's name, its condition and a hash of all that was logged: scores change with each."""
+    content = hashlib.sha256()
+    for name, values in sorted(log.columns.items()):
+        content.update(name.encode() + values.tobytes())
+    return [file.path.name, asdict(file.condition), content.hexdigest()]
+
+
 def digest(settings: Sequence[Any]) -> str:
     """Short hash of the settings of a training, for a file's name."""
     return hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:12]
@@ -100,7 +108,7 @@ class Training:
 def scores_of(training: Training, group: Group, readable: dict[Path, FlightLog],
               options: argparse.Namespace) -> list[FlightScore]:
     """Scores of one training on the group's held-out flights, from the file of an earlier run if there is one."""
-    settings = settings_of(training, group, options)
+    settings = settings_of(training, group, readable, options)
     rounds = [adapt.ROUNDS] if training.row == "unlabelled" else []
     path = options.out / f"{training.row}_{training.name}_{digest([*settings, *rounds])}.json"
     if path.is_file():
@@ -111,12 +119,14 @@ def scores_of(training: Training, group: Group, readable: dict[Path, FlightLog],
     return scores
 
 
-def settings_of(training: Training, group: Group, options: argparse.Namespace) -> list[Any]:
-    """All that a training depends on, for the names of its files."""
+def settings_of(training: Training, group: Group, readable: dict[Path, FlightLog],
+                options: argparse.Namespace) -> list[Any]:
+    """All that a training and its scores depend on, for the names of their files: the version and the flights too."""
     row = training.row
     settings = [row, training.count, training.draw, training.seed, group.name, training.steps(options),
                 group.start.digest if group.start and row != "alone" else "",
-                [f.path.name for f in group.held], [f.log.source for f in group.pool]]
+                __version__, [identity(f, readable[f.path]) for f in group.held],
+                [identity(f.file, f.log) for f in group.pool]]
     if group.beside and row in ("labelled", "unlabelled"):
         settings += [bool(options.beside), adapt.STEPS, sorted(adapt.AUGMENTATION.items()), repr(adapt.DECODER),
                      [training_set.flight_hash(log) for log in group.beside.logs]]

@@ -167,7 +167,8 @@ def platforms(points: list[EdgePoint]) -> list[Platform]:
     """The platforms of a flight, each with its outline.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
-    no further apart than ROWS_APART times the median distance between successive rows.
+    no further apart than ROWS_APART times the median distance between successive rows. Rows without an edge that were
+    flown between two passes are not looked at: two platforms across the rows, nearer than that, become one.
     """
     crossed = passes(points)
     groups: list[list[tuple[EdgePoint, EdgePoint]]] = []
@@ -233,7 +234,12 @@ def _fit(group: list[tuple[EdgePoint, EdgePoint]]) -> Platform:
 
 
 def geojson(points: list[EdgePoint], platforms: list[Platform], properties: dict) -> dict:
-    """A GeoJSON FeatureCollection in a local metric plane (not longitude and latitude; it says so)."""
+    """A GeoJSON FeatureCollection in a local metric plane (not longitude and latitude; it says so).
+
+    The "95 % band of the outline" is 2 sigma of the timing on either side of the line, not a confidence region of the
+    outline: it does not hold that the platform ends up to a row beyond its first and last pass, which lie inside it.
+    The area is too small by that too.
+    """
     features = [
         _feature(Point(p.x_m, p.y_m), role="edge", kind=p.kind, sample=p.sample, sigma_m=round(p.sigma_m, 4))
         for p in points

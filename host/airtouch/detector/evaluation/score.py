@@ -1,5 +1,6 @@
 """Scores of one flight: detections matched one to one with true edges."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import NamedTuple, Protocol
@@ -76,8 +77,8 @@ class FlightScore:
 
     @property
     def flight(self) -> str:
-        """What tells the flight from others: its path, for files in two folders may have the same name."""
-        return self.path or self.file
+        """What tells the flight from others: its full path, for files in two folders may have the same name."""
+        return os.path.realpath(self.path) if self.path else self.file
 
     def balanced_accuracy(self) -> float | None:
         """Mean of sensitivity and specificity of the windows, 0 to 1; None without positives or without negatives."""

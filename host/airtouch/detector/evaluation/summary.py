@@ -1,5 +1,6 @@
 """Scores of many flights as one table, each figure with its interval."""
 
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -48,10 +49,13 @@ def paired(first: Sequence[FlightScore], second: Sequence[FlightScore], compare:
     """95 % intervals of what `compare` makes of two sets of scores of the same flights, each drawn for both at once.
 
     compare: the figures of `summarise` by name, shapes (...,), of the first and of the second -> name -> (...,).
-    Flights that one of them lacks are left out; None as in `bootstrap`.
+    Flights that one of them lacks are left out, with a warning; None as in `bootstrap`.
     """
     others = {s.flight: s for s in second}
     pairs = [(s, others[s.flight]) for s in first if s.flight in others]
+    if alone := len(first) + len(second) - 2 * len(pairs):
+        warnings.warn(f"{alone} of {len(first) + len(second)} scores have no score of the same flight beside them: the "
+                      "intervals leave them out", stacklevel=2)
     table = {f"{side} {key}": np.array([_totals(pair[side])[key] for pair in pairs], float)
              for side in (0, 1) for key in _totals_keys()}
 
@@ -85,9 +89,9 @@ def breakdown(scores: Sequence[FlightScore], key: Callable[[FlightScore], str | 
 
 
 def _order(value: str) -> tuple[bool, float, str]:
-    """Numbers by value, before names."""
+    """Numbers by value, also those of centimetres, before names."""
     try:
-        return False, float(value), value
+        return False, float(value.removesuffix(" cm")), value
     except ValueError:
         return True, 0.0, value
 
@@ -100,15 +104,15 @@ def by_height(scores: Sequence[FlightScore]) -> dict[str, dict]:
 
 
 def by_centimetre(scores: Sequence[FlightScore]) -> dict[str, dict]:
-    """As `by_height`; heights in millimetres in whole centimetres, for simulated ones are drawn and all differ."""
+    """As `by_height`; heights such as "24mm" in whole centimetres, for simulated ones are drawn and all differ."""
     def rounded(score: FlightScore) -> FlightScore:
-        digits = (score.condition.height or "").removesuffix("mm")
-        if not digits.isdigit():
+        height = score.condition.height or ""
+        digits = height.removesuffix("mm")
+        if digits == height or not digits.isdigit():
             return score
-        return replace(score, condition=replace(score.condition, height=f"{(int(digits) + 5) // 10}"))
+        return replace(score, condition=replace(score.condition, height=f"{(int(digits) + 5) // 10} cm"))
 
-    groups = by_height([rounded(score) for score in scores])
-    return {f"{value} cm" if value.isdigit() else value: row for value, row in groups.items()}
+    return by_height([rounded(score) for score in scores])
 
 
 def by_angle(scores: Sequence[FlightScore]) -> dict[str, dict]:

@@ -27,7 +27,7 @@ def check(text: str, source: str) -> None:
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in known:
             _check(node.attr, SIGNALS, "signal", source, node.lineno)
-    parameters = tuple(_parameters(tree))
+    parameters = _parameters(tree)
     for function in _settings(tree):
         row, values = (a.arg for a in function.args.args[:2])
         for node in ast.walk(function):
@@ -128,13 +128,16 @@ def _signal_modules(tree: ast.Module) -> Iterator[str]:
             yield from (a.asname for a in node.names if a.name == "airtouch.simulation.signals" and a.asname)
 
 
-def _parameters(tree: ast.Module) -> Iterator[str]:
-    """Names of the parameters that the file declares."""
+def _parameters(tree: ast.Module) -> tuple[str, ...]:
+    """Names of the parameters that the file declares; none if one of them is computed, for then they are not known."""
+    names = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter" and node.args:
-            first = node.args[0]
-            if isinstance(first, ast.Constant):
-                yield str(first.value)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Parameter":
+            name = node.args[0] if node.args else next((k.value for k in node.keywords if k.arg == "name"), None)
+            if not (isinstance(name, ast.Constant) and isinstance(name.value, str)):
+                return ()
+            names.append(name.value)
+    return tuple(names)
 
 
 def _settings(tree: ast.Module) -> Iterator[ast.FunctionDef]:

@@ -70,6 +70,7 @@ def _evaluate(node: ast.expr, values: Mapping[str, Any]) -> float:
         return -_evaluate(node.operand, values)
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
         return _BINARY[type(node.op)](_evaluate(node.left, values), _evaluate(node.right, values))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS:
+    if (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS
+            and not node.keywords):
         return _FUNCTIONS[node.func.id](*(_evaluate(a, values) for a in node.args))
     raise ValueError

@@ -1,4 +1,7 @@
-"""Work sent out a little ahead, its results taken in order: one loop for threads, processes and a cluster."""
+"""Work sent out a little ahead, its results taken in order, from threads, processes or a cluster.
+
+`simulation.workers.cluster` takes flights in any order, in a loop of its own.
+"""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
