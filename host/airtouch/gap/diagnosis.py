@@ -16,7 +16,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, notes_on, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -86,9 +86,11 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
     nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, notes)), notes)
-    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, notes)), notes)
+    of_flights: list[str] = []
+    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, of_flights)), of_flights)
     if not usable:
-        raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
+        raise none_usable(of_flights, "no flight to diagnose")
+    notes += of_flights
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
