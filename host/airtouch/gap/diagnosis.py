@@ -2,6 +2,9 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
+
+import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import next_steps
@@ -96,7 +99,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
                                         pictures)
     say("calibration")
-    calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
+    calibrated_with = (vehicle, tuple(_content(f) for f in nominal), tuple(sorted(without)))
     if before is not None and before.calibrated is not None:
         if before.calibrated_with != calibrated_with:
             raise AirTouchError("the diagnosis before has another vehicle, baseline or effects left out: its "
@@ -118,6 +121,15 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
                    calibrated=calibrated, calibrated_with=calibrated_with)
+
+
+def _content(flight: Flight) -> str:
+    """What tells a flight from another, of the same name too: its name and a hash of its log's columns."""
+    digest = sha256()
+    for name, values in sorted(flight.log.columns.items()):
+        digest.update(f"{name} {values.shape} ".encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return f"{flight.name} {digest.hexdigest()}"
 
 
 def _names(without: Iterable[str]) -> tuple[str, ...]:
