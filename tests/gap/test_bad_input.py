@@ -1,6 +1,7 @@
 """Bad input: one line that names file, place and remedy, or an answer that says what is missing."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -218,3 +219,12 @@ def test_a_flight_that_is_too_short_is_refused(sweeps):
 def test_a_diagnosis_of_no_flight_is_refused():
     with pytest.raises(AirTouchError, match="no flight to diagnose"):
         diagnose([], VEHICLE)
+
+
+def test_without_a_flight_the_error_is_of_the_flights_not_of_the_baseline(sweeps):
+    one, other, nominal = (replace(sweeps[0].slice(0, 1), meta={"source": n}) for n in ("one", "other", "nominal"))
+    with pytest.raises(AirTouchError, match="no flight to diagnose"):
+        diagnose([], VEHICLE, [nominal])
+    with pytest.raises(AirTouchError, match="of 2; the first: one") as error:
+        diagnose([one, other], VEHICLE, [nominal])
+    assert "nominal" not in str(error.value)

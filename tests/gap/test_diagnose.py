@@ -97,11 +97,13 @@ def test_flights_are_too_short_where_the_error_says_so(lengths, enough):
 
 @pytest.mark.parametrize(("changes", "refused"), [
     ({}, False), ({"vehicle": replace(VEHICLE, mass_kg=0.04)}, True), ({"baseline": ("b",)}, True),
-    ({"without": ("mass",)}, True)])
+    ({"baseline": ("namesake",)}, True), ({"baseline": ("copy",)}, False), ({"without": ("mass",)}, True)])
 def test_a_calibration_is_used_again_for_the_same_vehicle_baseline_and_effects_alone(monkeypatch, changes, refused):
     """Each call is made for one calibration: a second one of other inputs would be an answer to another question."""
     logs = {name: replace(log, meta={**log.meta, "source": name}) for name, log in zip("ab", short_flights.fly(2),
                                                                                        strict=True)}
+    logs["namesake"] = replace(logs["b"], meta=logs["a"].meta)  # another flight of the same name
+    logs["copy"] = replace(logs["a"], columns={k: v.copy() for k, v in logs["a"].columns.items()})  # as if read again
     calibrations = []
 
     def calibrated(vehicle, nominal, without):

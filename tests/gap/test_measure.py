@@ -73,6 +73,15 @@ def test_error_without_a_flight_is_that_of_the_flight_not_of_the_baseline(sweeps
     assert "nominal" not in str(error.value)
 
 
+def test_a_flight_without_a_gyro_is_left_out_among_others_that_have_one(sweeps):
+    """Its map is that of the others alone."""
+    bare = FlightLog({k: v for k, v in sweeps[2].columns.items() if k not in GYRO}, {"source": "bare"})
+    mixed, alike = measure([bare, *sweeps[:2]], VEHICLE), measure(sweeps[:2], VEHICLE)
+    assert mixed.map.cells == alike.map.cells and mixed.flights == alike.flights
+    assert [r for r in mixed.left_out if "bare: no gyro" in r]
+    assert measure([bare], VEHICLE).flights == ("bare",)
+
+
 def test_a_push_over_the_platform_is_found_there(sweeps):
     before = measure(sweeps, VEHICLE)
     after = measure([pushed(log, 3.0, "over platform") for log in sweeps], VEHICLE)

@@ -2,6 +2,9 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
+
+import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import next_steps
@@ -16,7 +19,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, notes_on, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_flights, with_gyro_if_any
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -86,15 +89,17 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
     nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, notes)), notes)
-    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, notes)), notes)
+    of_flights: list[str] = []
+    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, of_flights)), of_flights)
     if not usable:
-        raise AirTouchError(notes[-1] if notes else "no flight to diagnose")
+        raise none_usable(of_flights, "no flight to diagnose")
+    notes += of_flights
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
                                         pictures)
     say("calibration")
-    calibrated_with = (vehicle, tuple(f.name for f in nominal), tuple(sorted(without)))
+    calibrated_with = (vehicle, tuple(_content(f) for f in nominal), tuple(sorted(without)))
     if before is not None and before.calibrated is not None:
         if before.calibrated_with != calibrated_with:
             raise AirTouchError("the diagnosis before has another vehicle, baseline or effects left out: its "
@@ -116,6 +121,15 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
     return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
                    calibrated=calibrated, calibrated_with=calibrated_with)
+
+
+def _content(flight: Flight) -> str:
+    """What tells a flight from another, of the same name too: its name and a hash of its log's columns."""
+    digest = sha256()
+    for name, values in sorted(flight.log.columns.items()):
+        digest.update(f"{name} {values.shape} ".encode())
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return f"{flight.name} {digest.hexdigest()}"
 
 
 def _names(without: Iterable[str]) -> tuple[str, ...]:

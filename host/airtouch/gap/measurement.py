@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
 from airtouch.gap.flights.fitness import cannot_of, notes_of
-from airtouch.gap.flights.flight import ready, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import none_usable, ready, ready_flights, with_gyro_if_any
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
@@ -86,7 +86,7 @@ class MeasuredFlight:
     """One flight held against the model of each study.
 
     parts: of the map of each study; power: of its commands; speeds (2, 4): `rotor_speeds`, 1/min; notes, cannot: of the
-    `Flight`.
+    `Flight`; has_gyro: whether it has one.
     """
 
     parts: tuple[Part, ...]
@@ -94,6 +94,12 @@ class MeasuredFlight:
     speeds: np.ndarray | None
     notes: tuple[str, ...]
     cannot: tuple[str, ...]
+    has_gyro: bool
+
+    @property
+    def name(self) -> str:
+        """Of the flight."""
+        return self.parts[0].name
 
 
 def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[FlightLog] = (), *,
@@ -124,7 +130,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [*notes_of([(m.parts[0].name, m.notes) for m in measured]),
+    notes += [*notes_of([(m.name, m.notes) for m in measured]),
               *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
     first = summary.headline(maps[0].cells)
     return Measurement(
@@ -139,21 +145,20 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
 
 def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], mapper: Callable, progress: Callable[[str], None],
               left_out: list[str]) -> list[MeasuredFlight]:
-    """Each flight that can be used against the model of each study; reasons of the others are added to `left_out`.
+    """Each flight that can be used against the model of each study, those with a gyro if any has.
 
-    Raises AirTouchError when no flight can be used.
+    The reasons of the others are added to `left_out`. Raises AirTouchError when no flight can be used.
     """
     measured: list[MeasuredFlight] = []
     for one in mapper(partial(measured_flight, tuple(studies)), flights):
         if isinstance(one, str):
             left_out.append(one)
         else:
-            progress(one.parts[0].name)
+            progress(one.name)
             measured.append(one)
     if not measured:
-        raise AirTouchError(left_out[0] if len(left_out) == 1 else "no flight that can be used" +
-                            (f" of {len(left_out)}; the first: {left_out[0]}" if left_out else ""))
-    return measured
+        raise none_usable(left_out)
+    return with_gyro_if_any(measured, left_out)
 
 
 def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight | str:
@@ -163,12 +168,13 @@ def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight 
     except AirTouchError as error:
         return str(error)
     return MeasuredFlight(tuple(part_of(s, flight) for s in studies), command_power(flight, studies[0].vehicle),
-                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot)
+                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot, flight.has_gyro)
 
 
 def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
     """The curves of a measurement, of its first flights."""
-    flights = list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])) if measurement.where else []
+    flights = with_gyro_if_any(list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])), []) \
+        if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
     curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where)

@@ -210,8 +210,8 @@ class Diagnosis:
     pictures: "Pictures | None" = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
     calibrated: "tuple[Study, Calibration | None] | None" = field(default=None, repr=False, compare=False)
-    #: of that calibration the vehicle, the names of the baseline flights, those left out included, and of the effects
-    #: left out
+    #: of that calibration the vehicle, name and hash of the baseline flights, those left out included, and the names of
+    #: the effects left out
     calibrated_with: "tuple[Vehicle, tuple[str, ...], tuple[str, ...]] | None" = field(default=None, repr=False,
                                                                                       compare=False)
 

@@ -34,6 +34,16 @@ def test_neither_the_answer_nor_another_name_of_it_is_wrong(pushed, monkeypatch)
     assert control_of(data, selection, gap) is None
 
 
+def test_another_name_of_the_answer_is_not_wrong_where_a_rival_is_as_good(pushed, monkeypatch):
+    data, selection, gap = pushed
+    named = selection.single_effects["mass"]
+    gained = {"mass": named.gain, "wind": named.gain - 1.0, "thrust_coefficient": named.gain - 20.0}
+    rivals = {n: replace(named, name=n, gain=gain) for n, gain in gained.items()}
+    of = replace(selection, single_effects=rivals, least_nats=dict.fromkeys(rivals, 8.0))
+    monkeypatch.setattr("airtouch.gap.answer.controls.WRONG", ("thrust_coefficient", "com_offset"))
+    assert control_of(data, of, gap).name == "com_offset"
+
+
 def test_the_gap_is_also_closed_with_the_vehicle_as_declared(pushed):
     """With the same study it closes as much; with none the answer's own is the only one."""
     data, selection, gap = pushed

@@ -55,6 +55,16 @@ def test_a_hover_lasts_four_seconds_without_take_off_and_landing(seconds, count)
     assert len(stretches_in_air(hover)) == count and hover_pattern(hover, VEHICLE).known == bool(count)
 
 
+def test_a_hole_in_which_nothing_is_measured_does_not_count():
+    """The straight line over it, at half thrust, changes nothing: each side of it is a hover of its own."""
+    hover, hole = noisy(), np.zeros(round(100 * SECONDS), bool)
+    hole[900:1100] = True
+    changed = replace(hover, unmeasured=hole, pwm=np.where(hole[:, None], 0.5 * hover.pwm, hover.pwm))
+    assert stretches_in_air(changed) == [(round(100 * SETTLE_S), 900), (1100, round(100 * (SECONDS - SETTLE_S)))]
+    lift = hover_pattern(hover, VEHICLE).balance[0]
+    assert hover_pattern(changed, VEHICLE).balance[0] == pytest.approx(lift, abs=0.002)
+
+
 def test_a_flight_without_a_hover_takes_no_part_in_the_mean():
     one, none = (hover_pattern(noisy(seconds), VEHICLE) for seconds in (SECONDS, 3.0))
     np.testing.assert_array_equal(mean_pattern([one, none]).array(), one.array())

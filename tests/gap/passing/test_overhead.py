@@ -42,6 +42,15 @@ def test_a_vehicle_is_overhead_where_both_logs_hold_the_time():
         assert overhead.seconds_overhead(low, [path(3.0, place)]) == ()
 
 
+def test_a_partner_is_overhead_though_the_first_time_of_a_fast_log_is_missing():
+    """The log is resampled, from its first known time on: 8 to 12 s on the clock are 5 to 9 s after it."""
+    time = 3.0 + 0.002 * np.arange(10_000)
+    time[0] = np.nan
+    low = FlightLog({"t_s": time, **{k: np.full(len(time), v) for k, v in zip(overhead.POSITION, (0.0, 0.0, 0.5),
+                                                                             strict=True)}}, {"source": "low"})
+    assert overhead.seconds_overhead(low, [path(8.0, (0.1, 0.0, 0.9), 4.0)]) == (pytest.approx((5.0, 9.0), abs=0.02),)
+
+
 def test_two_vehicles_overhead_one_after_another_are_two_intervals():
     low = path(0.0, (0.0, 0.0, 0.5))
     partners = [path(2.0, (0.0, 0.0, 0.9), 1.0), path(6.0, (0.0, 0.1, 0.8), 2.0)]

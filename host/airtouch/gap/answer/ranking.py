@@ -93,6 +93,6 @@ def alike_of(selection: Selection) -> tuple[tuple[str, ...], ...]:
         groups.append(tuple(sorted(as_good)))
     for step in selection.named_steps:
         synonyms = names_alike(step.name)
-        if synonyms and not any(step.name in g for g in groups):
+        if synonyms and not any(synonyms.effects <= set(g) for g in groups):
             groups.append(tuple(sorted(synonyms.effects)))
     return tuple(groups)

@@ -96,14 +96,18 @@ def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) ->
 def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
     """What is taken for a hover: first sample, and the one after the last, of each stretch in the air.
 
-    All that is flown is in it, moves and most of a climb as well, but SETTLE_S at either end. The numbers of a pattern
-    are means over that, of a hover only where the flight is one. CrazyPAD's flights are not: in 16 of the 91 the phase
-    hover has 10 to 26 % of it, and cruise most of the rest, at 0.2 m/s. So nominal flights must be flown alike.
+    All that is flown is in it, moves and most of a climb as well, but SETTLE_S at either end, and the holes in which
+    accelerations or commands are not measured (`Flight.unmeasured`), at which a stretch is split. The numbers of a
+    pattern are means over that, of a hover only where the flight is one. CrazyPAD's flights are not: in 16 of the 91
+    the phase hover has 10 to 26 % of it, and cruise most of the rest, at 0.2 m/s. So nominal flights must be flown
+    alike.
     """
     air = (flight.phase != GROUND) & ~flight.on_ground
     trim = int(SETTLE_S / PERIOD_S)
-    trimmed = [(a + trim, b - trim) for a, b in runs(air)]
-    return [(a, b) for a, b in trimmed if (b - a) * PERIOD_S >= LEAST_S]
+    settled = np.zeros(len(air), bool)
+    for a, b in runs(air):
+        settled[a + trim:max(b - trim, a + trim)] = True
+    return [(a, b) for a, b in runs(settled & ~flight.unmeasured) if (b - a) * PERIOD_S >= LEAST_S]
 
 
 def _mixed_thrust(flight: Flight, vehicle: Vehicle, at_one_volt: bool) -> np.ndarray:

@@ -138,7 +138,10 @@ def _height(log: FlightLog, window: slice) -> np.ndarray:
 
 
 def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active]) -> EdgeFloor | None:
-    """Mean response and scatter of flights declared nominal; None where they cross no edge."""
+    """Mean response and scatter of flights declared nominal.
+
+    None where they lack edges of a kind of KINDS, or have fewer than LEAST_WINDOWS windows of level flight without one.
+    """
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
     without_edge: list[np.ndarray] = []
     for f in flights:

@@ -92,7 +92,8 @@ def row_times(log: FlightLog, name: str) -> np.ndarray:
     at_rate = at_100_hz(log, name)
     lost = with_lost_rows(at_rate, name).lost
     times = np.full(len(lost), np.nan)
-    times[~lost] = interpolate_missing(log["t_s"]) if at_rate is log else log["t_s"][0] + at_rate["t_s"]
+    logged = interpolate_missing(log["t_s"])  # the resampled clock begins at the first known time
+    times[~lost] = logged if at_rate is log else logged[0] + at_rate["t_s"]
     return interpolate_missing(times)
 
 

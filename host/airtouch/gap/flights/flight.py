@@ -4,6 +4,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -66,6 +67,11 @@ class Flight:
 
     def __len__(self) -> int:
         return len(self.pwm)
+
+    @property
+    def has_gyro(self) -> bool:
+        """Whether its rates are logged."""
+        return self.rates is not None
 
     @property
     def bridged(self) -> np.ndarray:
@@ -149,16 +155,38 @@ def ready_flights(logs: Iterable[FlightLog], vehicle: Vehicle, reasons: list[str
         yield flight if name == flight.name else replace(flight, name=name)
 
 
-def with_gyro_if_any(flights: Sequence[Flight], reasons: list[str]) -> list[Flight]:
+class _Named(Protocol):
+    """A flight, or what was measured in it."""
+
+    @property
+    def name(self) -> str:
+        """Of the flight."""
+
+    @property
+    def has_gyro(self) -> bool:
+        """Whether its rates are logged."""
+
+
+_T = TypeVar("_T", bound=_Named)
+
+
+def with_gyro_if_any(flights: Sequence[_T], reasons: list[str]) -> list[_T]:
     """The flights that have a gyro, or all where none has: one floor, one map, cannot hold for both kinds.
 
     The reason why others are left out is added to `reasons`.
     """
-    with_gyro = [f for f in flights if f.rates is not None]
+    with_gyro = [f for f in flights if f.has_gyro]
     if len(with_gyro) in (0, len(flights)):
         return list(flights)
-    reasons += [f"{f.name}: no gyro, which the other flights have; left out" for f in flights if f.rates is None]
+    reasons += [f"{f.name}: no gyro, which the other flights have; left out" for f in flights if not f.has_gyro]
     return with_gyro
+
+
+def none_usable(reasons: Sequence[str], of_none: str = "no flight that can be used") -> AirTouchError:
+    """The error where no flight can be used: the reason of the only one, or of the first; of_none: where none came."""
+    if len(reasons) < 2:
+        return AirTouchError(reasons[0] if reasons else of_none)
+    return AirTouchError(f"no flight that can be used of {len(reasons)}; the first: {reasons[0]}")
 
 
 def notes_on(flights: Sequence[Flight], nominal: Sequence[Flight]) -> list[str]:

@@ -185,7 +185,8 @@ def unknown(sheet: Sheet) -> dict[str, Any]:
     Diagnoses without other effects, in which the true one could be named, do not count.
     said_unknown, wrong_name: share of them with that answer; auroc: of the probability of `unknown`, against the same
     flights with the effect in the registry. wrong_name_told_apart, auroc_told_apart: among those flights whose data
-    tell the effect from the names that it was given.
+    tell the effect from the names that it was given. A flight answered `unknown` or `none` got no name and counts as
+    told apart, so wrong_name_told_apart is a little too good.
     """
     single, full_registry = sheet.single_effect, sheet.full_registry
     out = {n: c for c in sheet.cases if (n := flight_of(c)) in single
