@@ -9,8 +9,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.passing.bursts import FORCE_BURSTS, burst_gate
-from airtouch.gap.passing.gate_search import MOST_INTERVALS, best_intervals, interval_cost, unbroken_stretches
-from airtouch.gap.signals.spectra import AIR, starts
+from airtouch.gap.passing.gate_search import MOST_INTERVALS, best_intervals, interval_cost
 from hovers import FLOOR, hover
 
 
@@ -35,22 +34,6 @@ def test_a_flight_has_no_more_than_so_many_intervals():
     gain = np.tile([10.0, -50.0], 10)
     assert best_intervals(gain, np.zeros(20, int), 1.0) == [(2 * k, 2 * k) for k in range(MOST_INTERVALS)]
     assert len(best_intervals(gain, np.repeat([0, 1], 10), 1.0)) == 2 * MOST_INTERVALS
-
-
-def test_an_interval_does_not_span_a_hole_in_its_flight():
-    """In the air in 0 to 8 s and 12 to 20 s: blocks of 2.56 s every 1.28 s, none of which touches the hole."""
-    usable = np.ones(2000, bool)
-    usable[800:1200] = False
-    begin = starts(replace(hover(3, length_s=20.0), usable=usable), AIR)
-    flight = np.zeros(len(begin), int)
-    stretch = unbroken_stretches(flight, begin)
-    assert len(set(stretch[begin < 800])) == len(set(stretch[begin >= 1200])) == 1 and stretch.max() == 1
-    found = best_intervals(np.ones(len(begin)), flight, 0.5, stretch)
-    last = int(np.flatnonzero(begin < 800)[-1])
-    assert found == [(0, last), (last + 1, len(begin) - 1)]
-    whole = starts(hover(3, length_s=20.0), AIR)
-    two = np.r_[np.zeros(len(whole), int), np.ones(len(whole), int)]
-    assert np.array_equal(unbroken_stretches(two, np.r_[whole, whole]), two), "without a hole it is the flight"
 
 
 def shaken(since_s, until_s, factor):

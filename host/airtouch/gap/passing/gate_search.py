@@ -55,12 +55,12 @@ def block_gate(data: Data, whole: BlockSet, null_log_likelihoods: np.ndarray, te
     which it gains, SEARCH_ROUNDS times at most; then the intervals' ends are moved.
     """
     air, cost = problem_of(data, whole).flat.air, interval_cost(len(null_log_likelihoods))
-    at_the_ends, stretch = _at_the_ends(data, air), unbroken_stretches(air.flight, air.begin)
+    at_the_ends = _at_the_ends(data, air)
     acting = _explained_worst(air, null_log_likelihoods)
     for _ in range(SEARCH_ROUNDS):
         fitted = fit(data, _part(whole, acting), terms)
         gain = np.where(at_the_ends, -np.inf, block_log_likelihoods(data, whole, fitted.terms) - null_log_likelihoods)
-        intervals = best_intervals(gain, air.flight, cost, stretch)
+        intervals = best_intervals(gain, air.flight, cost)
         chosen = np.zeros(len(null_log_likelihoods), bool)
         for first, last in intervals:
             chosen[first:last + 1] = True
@@ -78,27 +78,15 @@ def interval_cost(count: int) -> float:
     return 2.0 * np.log(count)
 
 
-def unbroken_stretches(flight: np.ndarray, begin: np.ndarray) -> np.ndarray:
-    """The number (b,) of each block's stretch: of one flight, without a sample between two blocks.
+def best_intervals(gain: np.ndarray, flight: np.ndarray, cost: float) -> list[tuple[int, int]]:
+    """Disjoint intervals (first, last) of blocks of one flight with the largest sums of gain, each over its cost.
 
-    At a landing, a touch or a hole there is one, as no block holds it. flight (b,), begin (b,): of each block, as in
-    `AirBlocks`.
+    gain (b,): nats of each block; flight (b,): its flight's number; cost: nats of each interval. There are at most
+    MOST_INTERVALS times the number of flights.
     """
-    breaks = (np.diff(flight) != 0) | (np.diff(begin) > LENGTH[AIR])
-    return np.r_[0, np.cumsum(breaks)]
-
-
-def best_intervals(gain: np.ndarray, flight: np.ndarray, cost: float, stretch: np.ndarray | None = None,
-                   ) -> list[tuple[int, int]]:
-    """Disjoint intervals (first, last) of blocks of one stretch with the largest sums of gain, each over its cost.
-
-    gain (b,): nats of each block; flight (b,): its flight's number; cost: nats of each interval; stretch (b,): the
-    number of its stretch, that of the flight by default. There are at most MOST_INTERVALS times the number of flights.
-    """
-    stretch = flight if stretch is None else stretch
     remaining, out = gain.copy(), []
     while len(out) < MOST_INTERVALS * (int(flight.max()) + 1):
-        interval = _best_interval(remaining, stretch, cost)
+        interval = _best_interval(remaining, flight, cost)
         if interval is None:
             break
         out.append(interval)
@@ -106,12 +94,12 @@ def best_intervals(gain: np.ndarray, flight: np.ndarray, cost: float, stretch: n
     return sorted(out)
 
 
-def _best_interval(gain: np.ndarray, stretch: np.ndarray, cost: float) -> tuple[int, int] | None:
+def _best_interval(gain: np.ndarray, flight: np.ndarray, cost: float) -> tuple[int, int] | None:
     """The interval (first, last) of the largest sum of gain over a cost, in one pass (Kadane); None without one."""
     best, interval = cost, None
     total, begin = 0.0, 0
     for k in range(len(gain)):
-        if total <= 0.0 or (k and stretch[k] != stretch[k - 1]):
+        if total <= 0.0 or (k and flight[k] != flight[k - 1]):
             total, begin = 0.0, k
         total += gain[k]
         if total > best:
