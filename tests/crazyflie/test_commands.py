@@ -156,7 +156,7 @@ def test_a_file_that_cannot_be_opened_leaves_the_drone_unarmed(tmp_path, monkeyp
     (tmp_path / "hop_0001.csv.gz.part").write_text("of a killed flight")
     settle = Mock()
     monkeypatch.setattr(collect, "settle", settle)
-    with pytest.raises(AirTouchError, match="--force replaces it"):
+    with pytest.raises(AirTouchError, match="collect --recover, or remove it"):
         fly_once(tmp_path, Mock(protocol=8), threading.Event())
     settle.assert_not_called()
 
