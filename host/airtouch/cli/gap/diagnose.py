@@ -56,14 +56,13 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         for name in without:
             effects.get(name)
         flights, nominal, partners = files.Flights(real), files.Flights(baseline), files.Flights(partner)
-        nominal_logs = list(nominal)
-        craft = files.vehicle_of(vehicle_name, flights, nominal_logs)
+        nominal_logs, logs = list(nominal), [] if each else list(flights)
+        craft = files.vehicle_of(vehicle_name, flights if each else logs, nominal_logs)
         case = _case(craft, nominal_logs, without, list(partners))
         if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
             click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
                        f"give it once ({len(same)} of {len(flights)} flights)", err=True)
         if not each:
-            logs = list(flights)
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
             diagnosis = case(logs, progress=bar, pictures=bool(report))

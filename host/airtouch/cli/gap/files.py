@@ -69,7 +69,7 @@ def files_of(names: Sequence[str]) -> list[Path]:
     return list(files)
 
 
-def vehicle_of(named: str | None, flights: Flights, baseline: Iterable[FlightLog] = ()) -> Vehicle:
+def vehicle_of(named: str | None, flights: Iterable[FlightLog], baseline: Iterable[FlightLog] = ()) -> Vehicle:
     """The vehicle named, else the one that the logs name, else the Crazyflie with flow deck.
 
     Raises AirTouchError where none is named and the logs, those of the baseline included, name two.
