@@ -109,9 +109,10 @@ def test_flights_of_two_vehicles_need_one_to_be_named(generated, tmp_path, comma
     with pytest.raises(AirTouchError) as error:
         CliRunner().invoke(command, [names.get(w, w) for w in call.split()], catch_exceptions=False,
                            standalone_mode=False)
-    said = str(error.value)
-    assert "crazyflie-2.1-flow flew " in said and "crazyflie-2.1-brushless flew " in said and "--vehicle" in said
-    assert "a.csv" in said and "b.csv" in said and "\n" not in said
+    message = str(error.value)
+    assert "crazyflie-2.1-flow flew " in message and "crazyflie-2.1-brushless flew " in message
+    assert "--vehicle" in message
+    assert "a.csv" in message and "b.csv" in message and "\n" not in message
 
 
 @pytest.mark.parametrize("meta", [{"vehicle": ""}, {"vehicle": "crazyflie-2.1", "assumed_vehicle": "crazyflie-2.1"}])

@@ -73,8 +73,8 @@ def test_every_command_takes_the_same_files_of_a_folder_for_flights(tmp_path, ca
     assert gap_files.files_of([str(tmp_path)]) == expected
     result = call("info", tmp_path, "--json")
     assert [f["file"] for f in json.loads(result.stdout)["left_out"]] == [str(p) for p in expected]
-    for said in (result.stderr, capsys.readouterr().err):  # of `logs` and of `gap`
-        assert f"{tmp_path}: 4 other files in this folder" in said
+    for message in (result.stderr, capsys.readouterr().err):  # of `logs` and of `gap`
+        assert f"{tmp_path}: 4 other files in this folder" in message
 
 
 def test_a_folder_without_flights_is_the_same_error_everywhere(folder):

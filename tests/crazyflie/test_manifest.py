@@ -42,10 +42,10 @@ def test_use_of_a_flight(lost_samples, zrange, planned, use):
 
 
 def test_the_reason_is_said_where_a_low_platform_makes_a_flight_messy(capsys, tmp_path):
-    for height_m, said in ((0.2, True), (0.4, False), (0.0, False)):
+    for height_m, low in ((0.2, True), (0.4, False), (0.0, False)):
         log = flight(zrange=over_a_platform(height_m), longest_gap_s=0.0)
         _report(Outcome(tmp_path / "a.csv", "as planned", log, use=manifest.use_of(log, planned=True)))
-        assert ("listed as messy: the platform is higher than 0.12 m" in capsys.readouterr().out) == said
+        assert ("listed as messy: the platform is higher than 0.12 m" in capsys.readouterr().out) == low
 
 
 def test_a_row_has_the_values_of_its_mission_and_replaces_an_older_one(tmp_path):

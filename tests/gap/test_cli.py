@@ -128,8 +128,8 @@ def test_the_log_names_the_vehicle(folder, tmp_path, capsys):
         path = tmp_path / f"{in_log or 'none'}.csv"
         logs.write(log.with_columns({}, vehicle=in_log), path)
         assert vehicle_of(None, Flights([str(path)])).name == name
-        said = capsys.readouterr().err
-        assert ("'mine'" in said, "names no vehicle" in said) == (in_log == "mine", in_log == "")
+        warning = capsys.readouterr().err
+        assert ("'mine'" in warning, "names no vehicle" in warning) == (in_log == "mine", in_log == "")
     assert vehicle_of("crazyflie-2.1", Flights([str(path)])).name == "crazyflie-2.1"
 
 

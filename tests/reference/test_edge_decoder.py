@@ -139,10 +139,10 @@ def test_logits_that_are_no_number_say_no():
 def test_the_crossing_is_looked_for_as_far_back_as_the_drone_keeps_logits():
     """The ring of edge_decoder.h holds this step and as many before it as may be asked for."""
     header = (Path(__file__).parents[2] / "firmware/kernels/edge_decoder.h").read_text()
-    kept = int(re.search(r"#define EDGE_DECODER_RING (\d+)", header).group(1))
-    assert DecoderConfig(look_back=kept - 1).look_back == 63
+    ring = int(re.search(r"#define EDGE_DECODER_RING (\d+)", header).group(1))
+    assert DecoderConfig(look_back=ring - 1).look_back == 63
     with pytest.raises(AirTouchError, match="look_back is 64, at most 63"):
-        DecoderConfig(look_back=kept)
+        DecoderConfig(look_back=ring)
 
 
 def test_logits_are_clamped_at_eight():

@@ -54,11 +54,11 @@ def test_a_change_of_what_a_function_calls_is_flown(tmp_path, where):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     if where != "beside":
         environment[where] = str(tmp_path / "cache")
-    said = []
+    lengths = []
     for factor in ("2.0", "2.0", "5.00"):
         (package / "simulation" / "sensors" / "called.py").write_text(CALLED.format(factor=factor))
-        said.append(subprocess.run([sys.executable, "-c", LENGTH], env=environment, cwd=tmp_path, capture_output=True,
-                                   text=True, check=True).stdout.strip())
-    assert said == ["6.0", "6.0", "15.0"]
-    kept = tmp_path / "cache" if where != "beside" else package
-    assert list(kept.rglob("caller.length*.nbi"))
+        lengths.append(subprocess.run([sys.executable, "-c", LENGTH], env=environment, cwd=tmp_path,
+                                      capture_output=True, text=True, check=True).stdout.strip())
+    assert lengths == ["6.0", "6.0", "15.0"]
+    caches = tmp_path / "cache" if where != "beside" else package
+    assert list(caches.rglob("caller.length*.nbi"))

@@ -123,8 +123,8 @@ def _open_locked(part: Path) -> int:
     file = os.open(part, os.O_WRONLY | os.O_CREAT, 0o644)
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        found = os.fstat(file)
-        if stat.S_ISREG(found.st_mode) and found.st_size:
+        status = os.fstat(file)
+        if stat.S_ISREG(status.st_mode) and status.st_size:
             raise AirTouchError(f"{part}: an unfinished flight; finish it with airtouch collect --recover, or remove "
                                 "it")
     except (OSError, AirTouchError):

@@ -48,9 +48,9 @@ def columns(n):
 
 @pytest.mark.parametrize("axis", ["x_m", "y_m"])
 def test_a_board_without_one_of_the_two_positions_has_no_track(axis):
-    board, some = Board("test", "best"), columns(100)
-    del some[axis]
-    board.add(np.arange(100) / 100, some, np.zeros(100))
+    board, values = Board("test", "best"), columns(100)
+    del values[axis]
+    board.add(np.arange(100) / 100, values, np.zeros(100))
     assert np.isnan(board.add_edge("entry", 0.9, 0.97).x_m)
 
 

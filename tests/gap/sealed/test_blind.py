@@ -387,8 +387,8 @@ def test_answers_that_cannot_be_scored_leave_the_key_shut(tmp_path, spoil, says)
 def test_unknown_is_right_only_where_the_true_effect_was_left_out(without, counts):
     """A mass in a diagnosis without wind is a right name; mass and thrust_coefficient are one."""
     mass = blind_key.DrawnFlight((blind_key.DrawnEffect("mass", "mass", 0, {"fraction": 0.1}),))
-    found = answer("a", "effect", [("mass", 1.0)], [("mass", {})], without)
-    out = blind_score.figures(blind_key.Key({"a": mass}), [found])["unknown"]
+    diagnosis = answer("a", "effect", [("mass", 1.0)], [("mass", {})], without)
+    out = blind_score.figures(blind_key.Key({"a": mass}), [diagnosis])["unknown"]
     assert out.get("all", {}).get("wrong_name", {}).get("n", 0) == counts
 
 

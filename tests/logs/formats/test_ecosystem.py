@@ -172,11 +172,11 @@ def test_a_command_that_takes_a_flight_takes_a_bag(bag, tmp_path, name):
     csv_file, written = tmp_path / "same.csv", str(tmp_path / "map.geojson")
     options = ["--truth", "--out", written, "--force"] if name == "map" else []
     logs.write(logs.read(bag), csv_file)
-    said = []
+    messages = []
     for path in (bag, csv_file):
         result = CliRunner().invoke(airtouch, [name, str(path), *options])
-        said.append(re.sub(r"\S*/(bag|same.csv)", "FLIGHT", result.output + str(result.exception)))
-    assert said[0] == said[1] and "folder" not in said[0]
+        messages.append(re.sub(r"\S*/(bag|same.csv)", "FLIGHT", result.output + str(result.exception)))
+    assert messages[0] == messages[1] and "folder" not in messages[0]
 
 
 def test_a_bag_has_the_condition_of_the_manifest_beside_it(bag):

@@ -49,8 +49,8 @@ def _check_places(function: ast.FunctionDef, parameters: int, numbers: Mapping[s
 
     numbers: the file's whole-number constants. known: names of the module of signals.
     """
-    values, seen, memory, _, out = (a.arg for a in function.args.args)
-    places = {values: parameters or PARAMETERS, seen: signals.COUNT, memory: MEMORY, out: 6}
+    values, signal, memory, _, wrench = (a.arg for a in function.args.args)
+    places = {values: parameters or PARAMETERS, signal: signals.COUNT, memory: MEMORY, wrench: 6}
     own = {node.id for node in ast.walk(function) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     constants = {name: value for name, value in numbers.items() if name not in own}
     for node in ast.walk(function):
