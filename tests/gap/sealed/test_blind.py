@@ -327,6 +327,22 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
         (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
 
 
+@pytest.mark.parametrize(("name", "drawn", "answered", "error"), [
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"strength": 0.2}, 1.0),
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"strength": 0.0}, 1.0),
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"charge": 0.4, "capacity": 0.2}, 0.0),
+    ("slung_load", {"load": 0.002, "length": 0.2}, {"load": 0.004}, 1.0),
+    ("wind", {"x": 0.3, "y": 0.0, "z": 0.0}, {"x": 0.7}, 4.0 / 3.0)])
+def test_the_error_is_that_of_parameters_with_a_neutral_value(name, drawn, answered, error):
+    """A strength twice too large is 100 % off, however well the charge of the battery or the length is known."""
+    quantities = {k: {"value": x, "low": x, "high": x} for k, x in (drawn | answered).items()}
+    key = blind_key.Key({"a": blind_key.DrawnFlight((blind_key.DrawnEffect(name, name, 0, drawn),))})
+    figures = blind_score.figures(key, [answer("a", "effect", [(name, 1.0)], [(name, quantities)])])
+    assert figures["parameters"]["error"]["value"] == pytest.approx(error)
+    assert (figures["parameters"]["coverage"]["hits"], figures["parameters"]["coverage"]["n"]) == \
+        (len(drawn) - len(answered), len(drawn))
+
+
 def test_flights_are_counted_whose_kind_has_no_strength_four_times_the_weakest():
     """Mass up to 0.2 where 0.1 can be seen, and a kind with room to spare."""
     strengths = {"mass": three_severities(0.1, 0.2), "inertia": three_severities(0.1, 1.0)}
