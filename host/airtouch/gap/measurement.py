@@ -68,7 +68,7 @@ class Measurement:
         return where, f"Overall it is {short(self.gap['before'])} times the floor{calibrated}"
 
     def plain(self) -> dict[str, Any]:
-        """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
+        """JSON-ready, the keys of host/docs/gap-json.md: `where` as in the diagnosis with `words`, `map` all cells."""
         return rounded({
             "vehicle": self.vehicle, "flights": list(self.flights), "baseline": list(self.baseline),
             "where": [plain_cell(c) | {"words": in_words(c)} for c in self.where],
