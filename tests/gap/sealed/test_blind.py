@@ -84,12 +84,13 @@ def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch)
         for name, without in cases:
             blind_run._place(answers, name, without).write_text(json.dumps({"flight": name, "without": without}))
 
-    def open_key(folder, answers):
+    def open_key(folder, answers, key):
         opened.append(answers)
         mass = blind_key.DrawnEffect("mass", "mass", 0, {})
         return blind_key.Key({n: blind_key.DrawnFlight((mass,)) for n in names})
 
-    for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None)):
+    for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None),
+                           ("sealed_key", lambda *_: b"{}")):
         monkeypatch.setattr(blind_run, name, stand_in)
     monkeypatch.setattr(blind_run.score, "score", lambda *_: {})
     for _ in range(2):  # the second time with the answers without an effect
