@@ -289,7 +289,7 @@ def test_scores_in_closed_form():
     assert figures["parameters"]["error"]["value"] == pytest.approx(0.2)
     assert figures["parameters"]["coverage"]["hits"] == 1
     ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in figures["by_severity"].items()}
-    assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 26th of 2 % of the flights
+    assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 27th of 2 % of the flights
     assert figures["shrink"]["right"]["value"] == pytest.approx(0.9) and figures["shrink"]["wrong"]["value"] == 0.0
     left_out = figures["unknown"]["all"]
     assert left_out["auroc"] == left_out["auroc_told_apart"] == 1.0 and left_out["wrong_name"]["hits"] == 0

@@ -58,8 +58,8 @@ def run(out: Path, flights: int | None = None, seed: int | None = None, *, worke
     flights, seed: of the set, FLIGHTS and SEED by default; AirTouchError is raised where a set that is there has others
     than are given. unknown: how many single flights are diagnosed once more without their effect, all by default.
     mapper: what stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. key: its
-    path, beside the folder by default; one that cannot be read is told before any flight is diagnosed. Takes about
-    4 s of one core for each flight, once more for each single one.
+    path, beside the folder by default; one that cannot be read is told before any flight is diagnosed. How long it
+    takes: host/docs/gap-blind.md, "Run it".
     """
     out = Path(out)
     if not (out / SEALED).exists():
