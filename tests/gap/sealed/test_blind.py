@@ -373,6 +373,12 @@ def test_answers_that_are_none(tmp_path):
     (tmp_path / "x.json").write_text("no")
     with pytest.raises(AirTouchError, match="not the JSON"):
         blind_answers.read_answers(tmp_path)
+    with pytest.raises(AirTouchError, match="gone.json: cannot be read: No such file or directory$"):
+        blind_answers.read_answers(tmp_path / "gone.json")
+    (tmp_path / "y.json").mkdir()
+    (tmp_path / "x.json").unlink()
+    with pytest.raises(AirTouchError, match="y.json: cannot be read: Is a directory$"):
+        blind_answers.read_answers(tmp_path)
 
 
 @pytest.mark.parametrize(("spoil", "says"), [
