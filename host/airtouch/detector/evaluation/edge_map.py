@@ -36,7 +36,8 @@ ROWS_APART = 4.0  #: most distance between passes over one platform, in median d
 class EdgePoint:
     """A detected edge: time, kind ("entry", "exit", "edge"), position and 1-sigma along the track.
 
-    time_s: of the detection from the log's first sample, with the detector's lag; x_m, y_m: without that lag.
+    time_s: of the detection from the log's first sample, with the detector's lag; x_m, y_m: without that lag. Position
+    and sigma are NaN where the track has none.
     """
 
     sample: int
@@ -45,6 +46,11 @@ class EdgePoint:
     x_m: float
     y_m: float
     sigma_m: float
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the track had a position at this edge."""
+        return bool(np.isfinite(self.sigma_m))
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,8 @@ class Platform:
 class EdgeMap:
     """The edges of one flight in the plane, m.
 
-    xy: track (n, 2). points: edges along it. position: source of the positions. lag_s, sigma_s: of the detections.
+    xy: track (n, 2). points: edges along it that have a position. position: source of the positions. lag_s, sigma_s: of
+    the detections. without_position: number of edges that have no position.
     """
 
     xy: np.ndarray
@@ -74,6 +81,7 @@ class EdgeMap:
     position: str
     lag_s: float
     sigma_s: float
+    without_position: int = 0
 
 
 @dataclass(frozen=True)
@@ -116,7 +124,8 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
     points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], period_s=period, sigma_s=sigma_s,
                          lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"
-    return EdgeMap(xy, points, platforms(points), position, lag_s, sigma_s)
+    placed = [p for p in points if p.has_position]
+    return EdgeMap(xy, placed, platforms(points), position, lag_s, sigma_s, len(points) - len(placed))
 
 
 def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:
@@ -139,7 +148,7 @@ def edge_points(
     xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = SAMPLE_PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
-    """Detections as points of the track.
+    """Each detection as a point of the track, without a position where the track misses one within SPEED_S of it.
 
     xy: track, (n, 2), metres, a row each period_s. samples: index of each detection; lag_s, the constant lag of the
     detector, is subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
@@ -149,22 +158,26 @@ def edge_points(
     for sample, kind in zip(samples, kinds, strict=True):
         at = int(np.clip(round(sample - lag_s / period_s), 0, len(xy) - 1))
         low, high = max(0, at - half), min(len(xy) - 1, at + half)
-        if not np.isfinite(xy[[low, at, high]]).all() or high == low:
-            continue
-        speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
-        x, y = map(float, xy[at])
-        points.append(EdgePoint(int(sample), sample * period_s, kind, x, y, sigma_s * max(speed, MIN_SPEED_MPS)))
+        x, y, sigma_m = np.nan, np.nan, np.nan
+        if np.isfinite(xy[[low, at, high]]).all() and high > low:
+            speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
+            x, y, sigma_m = *map(float, xy[at]), sigma_s * max(speed, MIN_SPEED_MPS)
+        points.append(EdgePoint(int(sample), sample * period_s, kind, x, y, sigma_m))
     return points
 
 
 def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
-    """Pairs of an entry and the next exit. An entry without an exit is left out, and an exit without an entry."""
+    """Pairs of an entry and the next exit. An entry without an exit is left out, and an exit without an entry.
+
+    So is a pair with an end that has no position. `points` must hold these too, so that no end of another pass follows.
+    """
     ordered = sorted(points, key=lambda p: p.sample)
-    return [(a, b) for a, b in pairwise(ordered) if a.kind == "entry" and b.kind == "exit"]
+    return [(a, b) for a, b in pairwise(ordered)
+            if a.kind == "entry" and b.kind == "exit" and a.has_position and b.has_position]
 
 
 def platforms(points: list[EdgePoint]) -> list[Platform]:
-    """The platforms of a flight, each with its outline.
+    """The platforms of a flight, each with its outline. points: all edges, also those without a position.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
     no further apart than ROWS_APART times the median distance between successive rows. Rows without an edge that were
