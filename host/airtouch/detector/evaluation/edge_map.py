@@ -9,13 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, mapping
 
 from airtouch.detector import registry
+from airtouch.detector.best import sensor_note
+from airtouch.detector.best.model import BestModel, is_shipped
 from airtouch.detector.evaluation import evaluate
+from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
@@ -99,15 +103,26 @@ def true_edges_of(log: FlightLog) -> TimedEdges:
 
 
 def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = None) -> TimedEdges:
-    """The edges that a detector reports, with the shipped model for None.
+    """The edges that a detector reports, with the shipped model for None; their timing error is assumed for most.
 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
     """
     module = registry.get(detector)
     evaluate.check(log, evaluate.spare_of(module))
     trained = registry.model_for(module, module.load(model), log)
-    return TimedEdges(module.run(log, trained).edges, module.lag_s(trained),
-                      getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
+    return TimedEdges(module.run(log, trained).edges, module.lag_s(trained), _sigma_s(trained, log))
+
+
+def _sigma_s(model: Any, log: FlightLog) -> float:
+    """Timing error of the model's detections, s: what it states, or ASSUMED_SIGMA_S.
+
+    Of the shipped `best` without a sensor at least its mean absolute error there, which an rms error is never below.
+    """
+    stated = float(getattr(model, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
+    missing = sensors.missing_sensors(log)
+    if not (missing and isinstance(model, BestModel) and is_shipped(model, missing)):
+        return stated
+    return max(stated, sensor_note.figures()[missing[0]]["mean_abs_error_s"])
 
 
 def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,
