@@ -1,6 +1,7 @@
 """Recorded motor commands through the same motors, rigid body and effects as in flight.
 
-Left out are the plant's motor_slowness and motor_dead_zone, which only effects of a user's own set, and motor noise.
+Left out are the plant's motor_slowness and motor_dead_zone, which only effects of a user's own set, motor noise, and
+the accelerometer's distance from the centre of mass: the specific force is that of the centre of mass.
 
 Nothing is integrated but what the motors and the effects remember: attitude, velocity
 and height come from the log where it has them. The diagnosis compares the result with
