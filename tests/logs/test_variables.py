@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from airtouch.logs import true_edges
+from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.variables import to_columns
 
 G = 9.81  #: m/s^2, as the firmware has it
@@ -44,9 +46,21 @@ def test_of_two_variables_for_a_column_the_whole_one_is_taken():
 
 
 def test_a_range_of_zero_is_near_below_and_no_answer_to_the_side():
-    columns, _ = converted(range__zrange=[0, 32766, 32767], range__front=[0, 32766, 32767])
-    assert np.array_equal(columns["zrange_m"], [0, 32.766, np.nan], equal_nan=True)
-    assert np.array_equal(columns["range_front_m"], [np.nan, 32.766, np.nan], equal_nan=True)
+    columns, _ = converted(range__zrange=[0, 400, 32767], range__front=[0, 400, 32767])
+    assert np.array_equal(columns["zrange_m"], [0, 0.4, np.nan], equal_nan=True)
+    assert np.array_equal(columns["range_front_m"], [np.nan, 0.4, np.nan], equal_nan=True)
+
+
+@pytest.mark.parametrize("outlier_mm", [5000, 8191, 65535])  # zranger2.c: "outliers typically occur as >8 [m]"
+def test_a_down_range_that_the_firmware_rejects_is_no_edge(outlier_mm):
+    n = 1000
+    millimetres = np.full(n, 800.0)
+    millimetres[500:540] = outlier_mm
+    motors = {f"motor__m{i}": 40000 + np.arange(n) % 7 for i in (1, 2, 3, 4)}
+    columns, _ = converted(range__zrange=millimetres, **motors)
+    log = FlightLog({"t_s": 0.01 * np.arange(n), **columns}, {"source": "x", "format": "usd", "warnings": []})
+    assert np.isnan(log["zrange_m"][500:540]).all() and np.isfinite(log["zrange_m"]).sum() == n - 40
+    assert true_edges(log) == []
 
 
 def test_accelerations_of_the_estimate_turn_into_the_body():

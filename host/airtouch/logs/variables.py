@@ -23,7 +23,7 @@ from airtouch.logs.flight_log import (
     VELOCITY,
 )
 from airtouch.logs.quaternion import decompress, euler, rotation, to_body
-from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
+from airtouch.logs.units import GRAVITY, GYRO_LSB, down_range_m, side_range_m
 
 #: metadata on the vehicle of a log that does not say which flew: `assumed_vehicle` makes `vehicle.of_log` warn
 ASSUMED = {"vehicle": "crazyflie-2.1", "assumed_vehicle": "crazyflie-2.1"}
@@ -66,11 +66,11 @@ def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[st
         if variable in table and name not in columns:
             columns[name] = table[variable] * factor
     if "range.zrange" in table:
-        columns["zrange_m"] = range_m(table["range.zrange"])
+        columns["zrange_m"] = down_range_m(table["range.zrange"])
     for name in RANGES:
         variable = f"range.{name.split('_')[1]}"
         if variable in table:
-            columns[name] = range_m(table[variable], zero_is_invalid=True)
+            columns[name] = side_range_m(table[variable])
     _attitude(table, columns)
     _rates(table, columns, meta)
     _acceleration(table, columns, meta)
