@@ -36,6 +36,13 @@ def test_a_channel_that_a_log_lacks_has_no_ratio():
     assert np.isnan(ratios_of_blocks(hover(0.0), gap, replace(CELL, channel="rate_x"))).all()
 
 
+def test_lost_rows_add_nothing_to_the_ratio():
+    """A constant gap has none between 2 and 6 Hz, whatever stands in the rows that were lost."""
+    lost = np.arange(4000) % 1000 < 20
+    force = np.where(lost, 50.0, 0.3)[:, None] * [1.0, 0.0, 0.0]
+    assert ratio_of(flight(40.0, force, lost=lost)).max() < 1e-9
+
+
 def test_a_command_is_held_against_the_floor_of_its_cell():
     """The replay's own floor says nothing of commands, whose floor is that of the loop."""
     one, gap = hover(0.0), np.zeros((4000, COUNT))

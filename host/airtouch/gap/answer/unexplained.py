@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.answer.followed_signals import followed_signals
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.flights.missing import interpolate_missing, interpolate_over
+from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import unsteadiness_ratio
 from airtouch.gap.passing.bursts import SHAKE_BAND_HZ, SHAKE_PIECE_S
@@ -84,12 +84,14 @@ def _unsteady_cell(study: Study, flights: Sequence[Flight], columns: Sequence[in
 def ratios_of_blocks(flight: Flight, residual: np.ndarray, cell: Cell) -> np.ndarray:
     """Rms of a cell's channel and band over the cell's floor, in each block (blocks,) in the air.
 
-    residual (n, COUNT): of the flight. NaN where the log lacks the channel.
+    residual (n, COUNT): of the flight; straight lines stand for rows that are not judged. NaN where the log lacks the
+    channel.
     """
     begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
     if not len(begin) or not np.isfinite(residual[:, c]).any():
         return np.full(len(begin), np.nan)
-    density = np.abs(short_time_spectra(interpolate_missing(residual[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
+    judged = interpolate_over(residual[:, c:c + 1], ~flight.bridged)
+    density = np.abs(short_time_spectra(judged, begin, AIR)[:, :, 0]) ** 2
     gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
     return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
 
