@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.edges.edge_response import BINS, SHRINKAGE, edges_of, logged, response, response_covariance
+from airtouch.gap.edges.edge_response import (
+    BINS,
+    SHRINKAGE,
+    edge_floor_of,
+    edges_of,
+    logged,
+    response,
+    response_covariance,
+)
 from airtouch.logs.flight_log import PWM, FlightLog
 from gap_flights import fly
 
@@ -64,3 +72,16 @@ def test_an_edge_that_is_hit_or_lost_is_no_evidence(name, samples, counts):
         lost[at] = True
     of_evidence = edges_of(replace(flight, usable=usable, lost=lost))
     assert (edges[0] in of_evidence) == counts and set(edges[2:]) <= set(of_evidence)
+
+
+@pytest.mark.parametrize("name", ["usable", "lost"])
+def test_a_scatter_is_not_measured_where_the_flight_is_hit_or_lost(name):
+    """The flight is evidence at its edges, and nowhere else: of a stretch without an edge nothing is known."""
+    flight = fly(1, 31)[0]
+    edges = edges_of(flight)
+    assert {e.kind for e in edges} == {"entry", "exit"} and edge_floor_of([flight], VEHICLE, ()) is not None
+    samples = np.arange(len(flight))
+    at_an_edge = np.any([(samples >= e.sample - 30) & (samples < e.sample + 130) for e in edges], axis=0)
+    away = {"usable": at_an_edge} if name == "usable" else {"usable": at_an_edge, "lost": ~at_an_edge}
+    hit = replace(flight, **away)
+    assert edges_of(hit) == edges and edge_floor_of([hit], VEHICLE, ()) is None
