@@ -161,10 +161,10 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
 
 
 def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
-    """Samples of level flight that have no edge near them and evidence around them, WINDOW_STEP apart."""
+    """Samples of level flight, WINDOW_STEP apart, whose responses are evidence and share no sample with an edge's."""
     level = np.isin(flight.phase, LEVEL)
     return [at for at in range(BEFORE, len(flight) - AFTER, WINDOW_STEP) if level[at - BEFORE:at + AFTER].all()
-            and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges) and _is_evidence(flight, at)]
+            and not any(abs(e.sample - at) < BEFORE + AFTER for e in edges) and _is_evidence(flight, at)]
 
 
 def response_covariance(without_edge: np.ndarray, at_edges: Mapping[str, np.ndarray]) -> np.ndarray:
