@@ -80,8 +80,11 @@ def to_pandas(flight: "Flight") -> "DataFrame":
 def from_pandas(table: "DataFrame") -> FlightLog:
     """The flight log of a pandas table. Columns with other names than the log's are left out.
 
+    So is a `sample_period_s` in `attrs` that `t_s` contradicts: the rows are a part of the log, or resampled.
     Raises AirTouchError if no column has a name of the log, and for one that holds something else than numbers.
     """
+    from airtouch.logs.checks.readings import stated_period_fits
+
     names = [str(name) for name in table.columns if str(name) in COLUMNS]
     if not names:
         raise AirTouchError(f"no column of this table has a name of the flight log; it has "
@@ -93,6 +96,8 @@ def from_pandas(table: "DataFrame") -> FlightLog:
             columns[name] = table[name].to_numpy(dtype=float)
         except (TypeError, ValueError) as error:
             raise AirTouchError(f"column {name} of this table holds something else than numbers: {error}") from None
+    if "t_s" in columns and not stated_period_fits(meta.get("sample_period_s"), columns["t_s"]):
+        del meta["sample_period_s"]
     return FlightLog(columns, meta)
 
 
@@ -102,14 +107,16 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
 
     detector: best, paper, paper-stream, baseline, or an object with the interface `detector.registry.Detector`.
     model: file of a trained model, None for the shipped one. Returns a trace with `.edges` (sample, kind,
-    probability) and `.probability`, (n,), of being over a platform. Raises AirTouchError for a flight that lacks
-    channels or has another rate.
+    probability) and `.probability`, (n,), of being over a platform. Warns of what a score would suffer from, as
+    `evaluate` does in its remarks. Raises AirTouchError for a flight that lacks channels or has another rate.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring
 
     module, log = registry.get(detector), read(flight)
     scoring.check(log, scoring.spare_of(module))
+    for remark in scoring.remarks(log):
+        warnings.warn(f"{log.source}: {remark}", stacklevel=_caller_level())
     return module.run(log, registry.model_for(module, module.load(Path(model) if model else None), log))
 
 
