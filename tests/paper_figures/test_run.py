@@ -149,6 +149,12 @@ def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
     assert figures == [False, True] and json.loads((tmp_path / "fig8d.json").read_text())["quick"]
 
 
+def test_a_whole_run_replaces_the_figures_of_a_quick_one(figures, tmp_path):
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True))
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"))
+    assert figures == [True, False] and not json.loads((tmp_path / "fig8d.json").read_text())["quick"]
+
+
 def test_a_figure_is_stale_by_what_it_reads_alone(figures, tmp_path):
     flights, air = tmp_path / "data" / "flights", tmp_path / "data" / "imrclab"
     for folder in (flights, air):
