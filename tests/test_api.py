@@ -226,6 +226,19 @@ def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
         at.evaluate([])
 
 
+@pytest.mark.parametrize("arguments, message", [
+    ({"scenario": 3}, "a scenario is a name, a .toml file or an object, not 3"), ({"scenario": None}, "not None"),
+    ({"vehicle": 3}, "a vehicle is a name, a .toml file or an object, not 3"),
+    ({"without": "gust"}, r"without is a list of effects: \['gust'\]"), ({"without": 3}, "a list of effects, not 3"),
+    ({"without": [3]}, "given by its name, not 3"), ({"effects": "wind"}, "or pairs of both, not 'wind'"),
+    ({"effects": 3}, "or pairs of both, not 3"), ({"effects": ["wind"]}, "is a pair of its name and .*, not 'wind'"),
+    ({"effects": [3]}, "is a pair of its name"), ({"effects": {"wind": 3}}, "is a pair of its name"),
+    ({"effects": {3: {}}}, "given by its name, not 3")])
+def test_arguments_of_another_kind_are_refused_in_one_line(arguments, message):
+    with pytest.raises(AirTouchError, match=message):
+        at.simulate(**{"scenario": "hover", **arguments})
+
+
 def test_a_mission_is_simulated_by_its_name():
     (log,) = at.simulate("sweep")
     assert log.meta["scenario"] == "sweep" and log["zrange_m"].max() > 0.7

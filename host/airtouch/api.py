@@ -181,8 +181,7 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
         if not isinstance(value, numbers.Integral) or value < least:
             raise AirTouchError(f"{name} must be a whole number from {least}, not {value!r}")
     scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
-    pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
-    logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))
+    logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=effects, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]
     if lost:
         raise AirTouchError(f"{len(lost)} of {flights} flights diverged; the first: {lost[0]}")
@@ -323,7 +322,7 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
         if warning:
             warnings.warn(python_words(warning), stacklevel=_caller_level())
         return craft
-    return vehicles.load(named) if isinstance(named, (str, Path)) else named
+    return named if isinstance(named, vehicles.Vehicle) else vehicles.load(named)
 
 
 def _caller_level() -> int:
