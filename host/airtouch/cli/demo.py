@@ -20,7 +20,7 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
-from airtouch.logs.files import make_folder
+from airtouch.logs.files import make_folder, no_empty_folders
 
 EPOCHS, STEPS = 8, 800  #: epochs of `paper`, training steps of `best`: two minutes on two cores
 SCORED = ("best", "paper", "baseline")  #: detectors
@@ -53,6 +53,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         raise AirTouchError(f"{report}: exists already; use --force to replace it")
     if not force and any((out / "model").glob("*")):
         raise AirTouchError(f"{out / 'model'}: holds a model already; use --force to replace it")
+    click.get_current_context().with_resource(no_empty_folders(out))
     make_folder(out)
     headings = Headings(started)
 
