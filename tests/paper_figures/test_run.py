@@ -188,6 +188,13 @@ def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tm
     assert "no such file or folder" in str(missing.exception)
 
 
+def test_a_power_log_that_no_chosen_figure_reads_is_refused(tmp_path):
+    (tmp_path / "run.json").write_text("{}")
+    result = CliRunner().invoke(command, ["--only", "range", "--power-log", str(tmp_path / "run.json"),
+                                          "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2 and "--power-log is for table1" in result.stderr and not (tmp_path / "out").exists()
+
+
 def test_processes_make_the_same_figures(tmp_path):
     chosen, messages = ["table1", "range"], tmp_path / "told"
     for out, workers in (("one", 1), ("two", 2)):

@@ -64,6 +64,8 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
     for path in (flights, power_log):
         if path is not None and not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
+    if power_log is not None and "table1" not in chosen:
+        raise click.UsageError("--power-log is for table1, which --only leaves out")
     job = Job(flights or find_flights(), out / "work", quick, power_log, partial(click.echo, err=True))
     records = run.run(chosen, out, job, force=force, command=typed(), workers=workers or min(available_cores(), 4))
     for name in chosen:
