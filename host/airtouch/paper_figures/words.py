@@ -15,6 +15,7 @@ Gain: TypeAlias = tuple[float | None, tuple[float, float] | None]  #: a fraction
 MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
 #: Margins within which the 95 % interval of a difference must lie for "the same" or "reached". No source: chosen.
 ERROR_MARGIN = 0.25  #: of a mean error or a power, as a fraction of it
+COUNT_MARGIN = 0.10  #: of a count without an interval (bytes, operations), as a fraction of the paper's
 SHARE_MARGIN = 0.10  #: of a share: of edges missed, of edges within a distance
 
 
@@ -92,6 +93,11 @@ def gained(reduction: Gain, least: float, below: float) -> bool | None:
     """Whether a `gain` is enough: yes if its interval begins at `least` or above, no if it ends under `below`."""
     low, high = reduction[1] or (np.nan, np.nan)
     return decided(low >= least, high < below)
+
+
+def near(value: float, published: float) -> bool:
+    """Whether a count lies within COUNT_MARGIN of the paper's."""
+    return abs(value - published) <= COUNT_MARGIN * published
 
 
 def decided(yes: bool, no: bool) -> bool | None:
