@@ -244,23 +244,18 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.logs.files import check_free
     from airtouch.twin import adapt as module
     from airtouch.twin import adapt_report
-    from airtouch.vehicle import DEFAULT_VEHICLE
 
     need("train", "training")
     _check_speed(speed_mps)
     out = Path(out)
     check_free(out, force)
-    if twin is not None and vehicle is not None:
-        raise AirTouchError("a twin has a vehicle of its own; leave vehicle out")
+    adapt_report.check_vehicle(twin, vehicle)
     files = _several(flights)
     if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
         raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
-    usable, left_out = adapt_report.readable(dataset.collect(files, speed_mps))
-    if not usable:
-        raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
-    work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
-    simulator = adapt_report.twin_for(usable, None if twin is None else Path(twin), craft, work, speed_mps=speed_mps,
-                                      seed=seed, bar=_stages(progress))
+    usable, left_out, simulator, work = adapt_report.prepared(
+        dataset.collect(files, speed_mps), out, None if twin is None else Path(twin), vehicle, speed_mps=speed_mps,
+        seed=seed, bar=_stages(progress))
     adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=best.load(None), seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
