@@ -90,6 +90,8 @@ def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
 
     Raises AirTouchError with the file and the missing or unknown key.
     """
+    if not isinstance(name_or_path, (str, Path)):
+        raise AirTouchError(f"a vehicle is a name, a .toml file or an object, not {name_or_path!r}")
     path = Path(name_or_path)
     if path.suffix == ".toml":
         try:

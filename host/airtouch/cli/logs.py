@@ -113,7 +113,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
       airtouch logs convert log00 log01 --out converted --rate 100
     """
     from airtouch.extras import need
-    from airtouch.logs.files import make_folder, write_bytes
+    from airtouch.logs.files import make_folder, no_empty_folders, write_bytes
     from airtouch.logs.formats import canonical, mapped, rerun_file
 
     if plain and ending != "csv":
@@ -123,6 +123,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     if mapping:
         mapped.load(mapping)
     folder = Path(out)
+    click.get_current_context().with_resource(no_empty_folders(folder))
     make_folder(folder)
     written: set[Path] = set()
     inputs = _inputs(files)

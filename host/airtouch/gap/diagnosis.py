@@ -83,7 +83,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
     flights, an unknown effect, or where `before` has another vehicle, baseline or effects left out.
     """
-    say, without = progress or (lambda _: None), _names(without)
+    say, without = progress or (lambda _: None), effects.names_of(without)
     if partner and len(flights) != 1:
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
@@ -129,13 +129,6 @@ def _content(flight: Flight) -> str:
         digest.update(f"{name} {values.shape} ".encode())
         digest.update(np.ascontiguousarray(values).tobytes())
     return f"{flight.name} {digest.hexdigest()}"
-
-
-def _names(without: Iterable[str]) -> tuple[str, ...]:
-    """The effects to leave out. Raises AirTouchError for one name in place of several, and for an unknown one."""
-    if isinstance(without, str):
-        raise AirTouchError(f"without is a list of effects: [{without!r}]")
-    return tuple(effects.get(name).name for name in without)
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
