@@ -37,7 +37,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import effects
-from airtouch.vehicle import Vehicle
+from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 BLOCK_S = LENGTH[AIR] * PERIOD_S  #: length of a block in the air, the least that is judged
@@ -93,7 +93,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     usable = with_gyro_if_any(list(ready_flights(flights, vehicle, of_flights)), of_flights)
     if not usable:
         raise none_usable(of_flights, "no flight to diagnose")
-    notes += of_flights
+    notes += [*of_flights, *other_baseline((name_in(f.meta) for f in flights), (name_in(f.meta) for f in baseline))]
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
