@@ -186,7 +186,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
-    return replace(answer, next=next_steps(answer, usable, comparison.vehicle))
+    return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],

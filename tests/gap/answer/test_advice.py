@@ -41,6 +41,12 @@ def test_none_asks_for_nothing_to_be_added():
     assert step.text.startswith("Nothing to add") and not step.command
 
 
+def test_none_with_a_floor_that_is_extrapolated_asks_for_another_baseline():
+    answer = replace(diagnosis(verdict="none", effects=()), baseline=BASELINE, indistinguishable=())
+    (step,) = next_steps(answer, WITH_GYRO, VEHICLE, extrapolated=True)
+    assert step.text.startswith("Fly the baseline like the test")
+
+
 @pytest.mark.parametrize("phase", sorted(MISSIONS))
 def test_an_open_gap_is_flown_again_in_its_phase(phase):
     again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))

@@ -75,13 +75,13 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return "How far it would close is not known."
     if diagnosis.verdict == "none":
         if short(before) == "1":
-            return "Over all it is at the floor, so there is nothing to close."
-        return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
+            return "The gap over all cells is at the floor, so there is nothing to close."
+        return f"The gap over all cells is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict == "unknown" and before <= 1.0:
         return ("Over all the gap is at the floor: what acts, acts in some seconds only." if unsteady_cell(diagnosis)
                 else "Over all the gap is at the floor, but the signals do not fit a flight without an effect.")
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
-        return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
+        return f"Nothing closes it yet: the gap over all cells stays {short(before)} times the floor."
     added, they = ("it", "it was") if len(diagnosis.effects) == 1 else ("them", "they were")
     data = f"that {they} fitted to" if diagnosis.judged_on == FITTED else "held out"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
