@@ -58,9 +58,9 @@ def test_an_open_gap_at_landing_is_flown_again_as_it_was():
     assert "same flight three times" in again.text and not again.command
 
 
-def test_effects_that_look_alike_come_first_and_what_is_missing_last():
+def test_a_baseline_that_is_missing_comes_first_then_effects_that_look_alike():
     answer = replace(diagnosis(), baseline=())
-    alike, switch_on, baseline, gyro = next_steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
+    baseline, alike, switch_on, gyro = next_steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
     assert alike.text.startswith("To tell mass from thrust_coefficient: ")
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
 

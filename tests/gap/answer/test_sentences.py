@@ -72,8 +72,15 @@ def test_none_says_how_large_the_gap_is(before, size):
 def test_an_effect_beside_the_first_is_named_as_one_though_the_headline_is_its_own():
     cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
     effects = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
-    _, which, _ = sentences(diagnosis(cells, effects=effects))
+    _, which, _ = sentences(replace(diagnosis(cells, effects=effects), baseline=("nominal.csv",)))
     assert which == "Its cause is motor noise (probability 93%), with weak motor beside it."
+
+
+@pytest.mark.parametrize(("name", "baseline", "caveat"), [
+    ("motor_noise", (), True), ("motor_noise", ("nominal.csv",), False), ("weak_motor", (), False)])
+def test_motor_noise_without_a_baseline_is_no_sure_answer(name, baseline, caveat):
+    answer = replace(diagnosis(effects=(NamedEffect(name, {}),)), baseline=baseline)
+    assert ("often called motor noise" in sentences(answer)[1]) == caveat
 
 
 def test_unknown_names_what_comes_nearest_and_closes_nothing():

@@ -29,7 +29,12 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
     whether some were flown unlike the baseline, so that their floor is extrapolated.
     """
     argument = argument_of(vehicle)
-    steps = [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
+    steps = []
+    if not answer.baseline:
+        steps.append(NextStep(
+            "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
+            "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
+    steps += [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
     if answer.verdict == "unknown":
         steps += _steps_for_open_gap(answer.headline, argument)
     if answer.verdict == "effect":
@@ -41,10 +46,6 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
         steps.append(NextStep(
             "Fly the baseline like the test: the floor is extrapolated to the test, and may hide an effect."
             if extrapolated else "Nothing to add; longer flights would lower the floor."))
-    if not answer.baseline:
-        steps.append(NextStep(
-            "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
-            "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
     if any(f.rates is None for f in flights):
         steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(steps)
