@@ -28,6 +28,11 @@ def test_named_effects_are_switched_on_in_the_simulator():
     assert words[words.index("--effect") + 1] == "imu_bias:acc_x=0.8m/s^2"
 
 
+def test_a_passing_effect_is_said_to_act_for_the_whole_flight_in_the_simulator():
+    (step,) = advice(diagnosis(effects=(NamedEffect("wind", {}, seconds=(("a.csv", 1.0, 2.0),)),)))
+    assert "acts for the whole flight" in step.text
+
+
 @pytest.mark.parametrize("vehicle", [replace(VEHICLE, name="my drone"), replace(VEHICLE, mass_kg=0.05)])
 def test_a_vehicle_of_a_file_of_its_own_is_named_by_a_file(vehicle):
     """`--vehicle` takes no name of a vehicle that is not built in, and would take another one for one that is."""

@@ -48,8 +48,9 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     if partner and not baseline:
         raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
     with LateBar() as bar:
-        from airtouch.cli.gap import files, show
+        from airtouch.cli.gap import files, next_commands, show
         from airtouch.simulation import effects
+        from airtouch.vehicle import name_in
 
         for path in effect_files:
             effects.load_file(path)
@@ -59,13 +60,15 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         nominal_logs, logs = list(nominal), [] if each else list(flights)
         craft = files.vehicle_of(vehicle_name, flights if each else logs, nominal_logs)
         case = _case(craft, nominal_logs, without, list(partners))
+        vehicle_named = vehicle_name or next(filter(None, (name_in(log.meta) for log in [*logs, *nominal_logs])), None)
         if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
             click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
                        f"give it once ({len(same)} of {len(flights)} flights)", err=True)
         if not each:
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
-            diagnosis = case(logs, progress=bar, pictures=bool(report))
+            diagnosis = next_commands.with_names(case(logs, progress=bar, pictures=bool(report)), vehicle_named, real,
+                                                 baseline)
             if json_path:
                 output.write_json(json_path, diagnosis.plain(), force)
             if report:
@@ -75,7 +78,8 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                 gap_report.write_diagnosis(report, diagnosis, command=typed(NAMES_SHOWN), force=force)
     diagnosed = 1
     if each:
-        diagnosed = _each(flights, case, json_path, runner(dask, effect_files), force)
+        diagnosed = _each(flights, case, lambda d: next_commands.with_names(d, vehicle_named, d.flights, baseline),
+                          json_path, runner(dask, effect_files), force)
     else:
         show.diagnosis(output.console(), diagnosis)
     show.left_out([*flights.failed.values(), *nominal.failed.values(), *partners.failed.values()])
@@ -93,8 +97,12 @@ def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) 
     return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without), partner=partner)
 
 
-def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> int:
-    """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing."""
+def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | None, run: Callable,
+          force: bool) -> int:
+    """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing.
+
+    with_names: a diagnosis with the names given in its commands.
+    """
     from functools import partial
 
     from rich.table import Table
@@ -114,7 +122,7 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
             table.add_row(Path(diagnosis.flights[0]).name, diagnosis.verdict,
                           "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
                           f"{first.probability:.0%}")
-            rows.append(diagnosis.plain())
+            rows.append(with_names(diagnosis).plain())
     if rows:
         output.console().print(table)
     if rows and json_path:

@@ -39,8 +39,10 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
         steps += _steps_for_open_gap(answer.headline, argument)
     if answer.verdict == "effect":
         names = " and ".join(dict.fromkeys(e.name for e in answer.effects))
+        always = " There it acts for the whole flight, not in its seconds alone."
         steps.append(NextStep(
-            f"Switch on {names} with these parameters in the simulator, and fly it again.",
+            f"Switch on {names} with these parameters in the simulator, and fly it again."
+            + always * any(e.seconds for e in answer.effects),
             simulate_command(answer.effects, argument)))
     if answer.verdict == "none":
         steps.append(NextStep(
