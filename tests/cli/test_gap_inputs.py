@@ -75,6 +75,15 @@ def test_each_tells_a_flight_that_is_in_its_baseline_too(generated, monkeypatch)
     assert "cannot differ from itself" in result.output
 
 
+def test_a_copy_of_a_baseline_flight_under_another_name_is_told(generated, tmp_path, monkeypatch):
+    copy = tmp_path / "real.csv.gz"
+    copy.write_bytes((generated / "f1.csv.gz").read_bytes())
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: made_diagnosis.diagnosis())
+    result = CliRunner().invoke(diagnose_command, [str(copy), str(generated / "f0.csv.gz"),
+                                                   "--baseline", str(generated / "f1.csv.gz")])
+    assert "real.csv.gz: is a baseline flight as well" in result.output and "(1 of 2 flights)" in result.output
+
+
 def test_the_command_in_a_report_can_be_pasted_and_long_lists_are_counted(monkeypatch):
     words = ["gap", "diagnose", "my flight.csv", "--partner", "high.csv", "--without", "wind", "--baseline", *"abcdef"]
     monkeypatch.setattr("sys.argv", ["/usr/bin/airtouch", *words])

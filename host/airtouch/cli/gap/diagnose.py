@@ -61,7 +61,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         craft = files.vehicle_of(vehicle_name, flights if each else logs, nominal_logs)
         case = _case(craft, nominal_logs, without, list(partners))
         vehicle_named = vehicle_name or next(filter(None, (name_in(log.meta) for log in [*logs, *nominal_logs])), None)
-        if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
+        if same := files.also_in(flights, nominal):
             click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
                        f"give it once ({len(same)} of {len(flights)} flights)", err=True)
         if not each:
