@@ -1,6 +1,6 @@
 """`airtouch gap diagnose`: which effect the simulator lacks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -101,7 +101,8 @@ def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | 
           force: bool) -> int:
     """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing.
 
-    with_names: a diagnosis with the names given in its commands.
+    The JSON is written anew after each flight, so that what is done stays if the rest is broken off. with_names:
+    gives a diagnosis the names that were given in its commands.
     """
     from functools import partial
 
@@ -113,7 +114,7 @@ def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | 
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
     with LateBar(len(flights), "diagnosing") as bar:
-        for diagnosis in run(partial(_alone, case), flights):
+        for diagnosis in run(partial(_alone, case), _told(flights, bar)):
             if isinstance(diagnosis, AirTouchError):
                 show.left_out([str(diagnosis)])
                 continue
@@ -123,11 +124,18 @@ def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | 
                           "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
                           f"{first.probability:.0%}")
             rows.append(with_names(diagnosis).plain())
+            if json_path:
+                output.write_json(json_path, {"cases": rows}, force or len(rows) > 1)
     if rows:
         output.console().print(table)
-    if rows and json_path:
-        output.write_json(json_path, {"cases": rows}, force)
     return len(rows)
+
+
+def _told(flights: Any, bar: LateBar) -> Iterator[Any]:
+    """The flights, each named on the bar before it is diagnosed."""
+    for log in flights:
+        bar.now(f"diagnosing {Path(log.source).name}")
+        yield log
 
 
 def _alone(case: Callable, log: Any) -> Any:
