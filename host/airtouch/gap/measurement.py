@@ -131,9 +131,9 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [*other_baseline([m.vehicle for m in measured], [name_in(f.log.meta) for f in nominal]),
-              *notes_of([(m.name, m.notes) for m in measured]),
-              *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
+    notes = [*notes_of([(m.name, m.notes) for m in measured]),
+             *notes_of([(f.name, f.notes) for f in nominal], "baseline flights"),
+             *other_baseline([m.vehicle for m in measured], [name_in(f.log.meta) for f in nominal]), *notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,
