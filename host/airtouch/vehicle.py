@@ -132,6 +132,12 @@ def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
     return craft, f"the log names no vehicle; {craft.name} is assumed, --vehicle names another" if assumed else None
 
 
+def arm_pwm_of(meta: Mapping[str, Any]) -> float:
+    """Mean PWM above which the vehicle that a log's metadata name flies; that of `of_log` where they name no known one.
+    """
+    return of_log(meta)[0].arm_pwm
+
+
 def of_logs(logs: Iterable[FlightLog]) -> tuple[Vehicle, str | None]:
     """The vehicle of flights of one vehicle: `of_log` of the first of them.
 

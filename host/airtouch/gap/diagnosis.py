@@ -19,7 +19,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_alike
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -88,9 +88,8 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
-    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, notes)), notes)
     of_flights: list[str] = []
-    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, of_flights)), of_flights)
+    usable, nominal = ready_alike(flights, baseline, vehicle, of_flights, notes)
     if not usable:
         raise none_usable(of_flights, "no flight to diagnose")
     notes += [*of_flights, *other_baseline((name_in(f.meta) for f in flights), (name_in(f.meta) for f in baseline))]

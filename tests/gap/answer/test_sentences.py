@@ -1,6 +1,8 @@
 """The answer in three sentences, by what the diagnosis names and by what its cells show."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -8,6 +10,8 @@ from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.result import FITTED, HELD_OUT, REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
+
+PAGE = Path(__file__).parents[3] / "host/docs/unknown.md"
 
 
 def test_effect_that_does_not_close_the_headline_cell_is_not_its_cause():
@@ -100,6 +104,8 @@ def test_an_unsteady_flight_is_told_by_its_seconds():
     where, _, how_far = sentences(of)
     assert where == ("The flight is less steady than nominal ones: yaw torque at 15-40 Hz is up to 4.3 times that of "
                      "the rest of the flight from 3.2 to 4.8 s of a.csv.")
+    (on_page,) = re.findall(r"^\| `(.*less steady.*)` \|", PAGE.read_text("utf-8"), re.M)
+    assert where.startswith(on_page)
     assert how_far == "Over all the gap is at the floor: what acts, acts in some seconds only."
     steady = replace(of, unexplained=(replace(shaken, floor="nominal flights"),))
     assert sentences(steady)[2] == ("Over all the gap is at the floor, but the signals do not fit a flight without an "
