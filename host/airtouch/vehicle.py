@@ -143,19 +143,32 @@ def arm_pwm_of(meta: Mapping[str, Any]) -> float:
 def of_logs(logs: Iterable[FlightLog]) -> tuple[Vehicle, str | None]:
     """The vehicle of flights of one vehicle: `of_log` of the first of them.
 
-    Raises AirTouchError where two logs name different vehicles; a name that the reader assumed is none.
+    Raises AirTouchError where two logs name different vehicles.
     """
     first: Mapping[str, Any] | None = None
     named: dict[str, str] = {}
     for log in logs:
         first = log.meta if first is None else first
-        name = str(log.meta.get("vehicle") or "")
-        if name and log.meta.get("assumed_vehicle") != name:
+        if name := name_in(log.meta):
             named.setdefault(name, log.source)
     if len(named) > 1:
         pairs = [f"{name} flew {source}" for name, source in list(named.items())[:2]]
         raise AirTouchError(f"two vehicles: {', '.join(pairs)}; give flights of one, or --vehicle for all of them")
     return of_log(first or {})
+
+
+def name_in(meta: Mapping[str, Any]) -> str:
+    """The vehicle that a log's metadata name, "" for none; a name that the reader assumed is none."""
+    name = str(meta.get("vehicle") or "")
+    return name if meta.get("assumed_vehicle") != name else ""
+
+
+def other_baseline(flights: Iterable[str], baseline: Iterable[str]) -> list[str]:
+    """A note where baseline flights name a vehicle that none of the flights names; names as `name_in` gives them."""
+    named = sorted(set(flights) - {""})
+    others = sorted(set(baseline) - {"", *named})
+    return [f"the baseline names vehicle {', '.join(others)}, the flights {', '.join(named)}: what differs may be the "
+            "vehicles; take a baseline of the same one"] if named and others else []
 
 
 def unknown_name(meta: Mapping[str, Any]) -> str:

@@ -37,7 +37,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import effects
-from airtouch.vehicle import Vehicle
+from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 BLOCK_S = LENGTH[AIR] * PERIOD_S  #: length of a block in the air, the least that is judged
@@ -92,7 +92,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     usable, nominal = ready_alike(flights, baseline, vehicle, of_flights, notes)
     if not usable:
         raise none_usable(of_flights, "no flight to diagnose")
-    notes += of_flights
+    notes += [*of_flights, *other_baseline((name_in(f.meta) for f in flights), (name_in(f.meta) for f in baseline))]
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
@@ -178,7 +178,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
-    return replace(answer, next=next_steps(answer, usable, comparison.vehicle))
+    return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],

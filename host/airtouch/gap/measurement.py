@@ -31,7 +31,7 @@ from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_p
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import GYRO, FlightLog
-from airtouch.vehicle import Vehicle
+from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class MeasuredFlight:
     """One flight held against the model of each study.
 
     parts: of the map of each study; power: of its commands; speeds (2, 4): `rotor_speeds`, 1/min; notes, cannot: of the
-    `Flight`; has_gyro: whether it has one.
+    `Flight`; has_gyro: whether it has one; vehicle: that its log names.
     """
 
     parts: tuple[Part, ...]
@@ -104,6 +104,7 @@ class MeasuredFlight:
     notes: tuple[str, ...]
     cannot: tuple[str, ...]
     has_gyro: bool
+    vehicle: str
 
     @property
     def name(self) -> str:
@@ -141,8 +142,9 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [*notes_of([(m.name, m.notes) for m in measured]),
-              *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
+    notes = [*notes_of([(m.name, m.notes) for m in measured]),
+             *notes_of([(f.name, f.notes) for f in nominal], "baseline flights"),
+             *other_baseline([m.vehicle for m in measured], [name_in(f.log.meta) for f in nominal]), *notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,
@@ -183,7 +185,8 @@ def measured_flight(studies: Sequence[Study], log: FlightLog, uses_gyro: bool = 
     if unused:
         flight = replace(flight, notes=(*flight.notes, GYRO_UNUSED))
     return MeasuredFlight(tuple(part_of(s, flight) for s in studies), command_power(flight, studies[0].vehicle),
-                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot, flight.has_gyro)
+                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot, flight.has_gyro,
+                          name_in(log.meta))
 
 
 def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:

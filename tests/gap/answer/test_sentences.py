@@ -70,21 +70,28 @@ def test_cells_that_newly_stand_out_are_counted_apart():
                                             (1.6, "1.6 times the floor; nominal flights may differ by as much.")])
 def test_none_says_how_large_the_gap_is(before, size):
     none = diagnosis(verdict="none", effects=())
-    assert sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"Over all it is {size}"
+    assert sentences(replace(none, gap={**none.gap, "before": before}))[2] == f"The gap over all cells is {size}"
 
 
 def test_an_effect_beside_the_first_is_named_as_one_though_the_headline_is_its_own():
     cells = [cell("force_z", "hover", 1.0, after=0.1, by="weak_motor")]
     effects = NamedEffect("motor_noise", {}), NamedEffect("weak_motor", {})
-    _, which, _ = sentences(diagnosis(cells, effects=effects))
+    _, which, _ = sentences(replace(diagnosis(cells, effects=effects), baseline=("nominal.csv",)))
     assert which == "Its cause is motor noise (probability 93%), with weak motor beside it."
+
+
+@pytest.mark.parametrize(("name", "baseline", "caveat"), [
+    ("motor_noise", (), True), ("motor_noise", ("nominal.csv",), False), ("weak_motor", (), False)])
+def test_motor_noise_without_a_baseline_is_no_sure_answer(name, baseline, caveat):
+    answer = replace(diagnosis(effects=(NamedEffect(name, {}),)), baseline=baseline)
+    assert ("often called motor noise" in sentences(answer)[1]) == caveat
 
 
 def test_unknown_names_what_comes_nearest_and_closes_nothing():
     where, which, how_far = sentences(diagnosis([cell("force_z", "hover", 0.5)], "unknown", ()))
     assert where == ("The gap lies mostly in lift at 0-0.5 Hz: in hover it is 0.5 m/s^2, 5 times the floor.")
     assert which == "No known effect explains it (probability 93%); the nearest is mass with 4.0%."
-    assert how_far == "Nothing closes it yet: over all it stays 4 times the floor."
+    assert how_far == "Nothing closes it yet: the gap over all cells stays 4 times the floor."
 
     far = diagnosis([cell("force_z", "hover", 0.5)], "unknown", ())
     ranking = tuple(replace(r, probability=0.0004) if r.name == "mass" else r for r in far.ranking)

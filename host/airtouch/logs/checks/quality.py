@@ -8,6 +8,7 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, spikes, stuck_intervals
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
+from airtouch.logs.checks.conventions import wrong_signs, wrong_units
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne, flies_below_in_words
@@ -84,7 +85,7 @@ def check(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> Quality:
         missing={name: count for name, count in missing.items() if count},
         duplicated=duplicates(log), stuck=stuck_intervals(log, flying), saturated=saturation_counts(log),
         spikes=spikes(log), segments=phases, edges=edges, warnings=[str(w) for w in log.meta.get("warnings", [])])
-    return replace(quality, warnings=quality.warnings + _faults_in_words(log, quality, arm_pwm))
+    return replace(quality, warnings=quality.warnings + _faults_in_words(log, quality, flying, arm_pwm))
 
 
 def clock_steps(log: FlightLog) -> np.ndarray:
@@ -114,11 +115,11 @@ def _duration(clock: np.ndarray, samples: int, period: float) -> float:
     return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
-def _faults_in_words(log: FlightLog, quality: Quality, arm_pwm: float) -> list[str]:
-    """One line for each fault of the log."""
-    words = []
+def _faults_in_words(log: FlightLog, quality: Quality, flying: np.ndarray, arm_pwm: float) -> list[str]:
+    """One line for each fault of the log. flying: samples in the air, (n,) bool."""
     if nothing_logged(log):
         return ["nothing was logged: every value of every channel is missing"]
+    words = [*wrong_units(log, flying), *wrong_signs(log, flying)]
     if quality.gaps:
         longest = max(gap.seconds for gap in quality.gaps)
         words.append(f"{quality.lost} samples lost in {len(quality.gaps)} gaps, the longest {longest:.2f} s")
