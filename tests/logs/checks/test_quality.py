@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch import logs
+from airtouch.detector.evaluation.evaluate import remarks
 from airtouch.logs.checks.clock import lost_samples, true_period
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
@@ -58,6 +59,23 @@ def test_lost_samples_are_told_from_bursts():
     period = true_period(arrival)
     assert period == pytest.approx(0.009993, rel=1e-3)
     assert [(g.sample, g.lost) for g in lost_samples(arrival, period)] == [(1000, 17), (2483, 1)]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.31, 0.45])
+def test_every_lost_sample_of_an_even_clock_is_counted(share):
+    """With 31 % lost, a twentieth of them was counted, and the rate was 69 Hz: the losses stretched the period."""
+    whole = sound_flight()
+    there = np.random.default_rng(5).random(len(whole)) >= share
+    there[-40:] = True  # too near the end to be sure
+    log = FlightLog({name: values[there] for name, values in whole.columns.items()}, whole.meta)
+    report = logs.check(log)
+    assert report.lost == np.count_nonzero(~there[np.argmax(there):])
+    assert report.rate_hz == pytest.approx(100, rel=1e-6)
+    resampled = logs.resample(log).meta["resampled"]
+    assert resampled["lost_samples"] == report.lost and resampled["from_hz"] == pytest.approx(100, rel=1e-6)
+    told = [line for line in remarks(log) if "were lost" in line]
+    assert told == [f"{report.lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were"]
+    assert not remarks(whole)
 
 
 def test_rows_lost_in_the_air_are_no_ground():

@@ -26,6 +26,7 @@ from airtouch.vehicle import arm_pwm_of
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
 LONG_HOLE_S = 1.0  #: s without a sample, the window of the network, from which a hole gets a remark
+MOST_LOST = 0.01  #: share of all samples that may be lost without a remark: that of a clean flight of `collect`
 MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
 
 
@@ -100,7 +101,10 @@ def remarks(log: FlightLog) -> list[str]:
     back = int((clock_steps(log) < 0).sum())
     clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
     time_s = log["t_s"] if log.has("t_s") else np.empty(0)
-    holes = [g for g in lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S) if g.seconds >= LONG_HOLE_S]
+    gaps = lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S)
+    holes, lost = [g for g in gaps if g.seconds >= LONG_HOLE_S], sum(g.lost for g in gaps)
+    if lost > MOST_LOST * (len(log) + lost) and not back:
+        clock.append(f"{lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were")
     if holes and not back:
         longest = max(holes, key=lambda g: g.seconds)
         clock.append(f"no sample in {longest.seconds:.2f} s before sample {longest.sample}; rows are taken as if there "
