@@ -113,6 +113,16 @@ def test_a_flight_that_lands_on_the_platform_has_a_landing():
     assert platform.start == 800 and 1500 < landing.start < 1600 and landing.stop == 1800
 
 
+def test_a_platform_crossed_on_a_lower_leg_is_no_landing():
+    """Most of the flight is at 1.0 m; the platform of 0.5 m is crossed at 0.6 m, from 21 to 24 s."""
+    time = 0.01 * np.arange(3000)
+    height = np.interp(time, [1, 3, 18, 19, 27, 29], [0.0, 1.0, 1.0, 0.6, 0.6, 0.0])
+    columns = {"t_s": time, "zrange_m": np.where((time > 21) & (time < 24), height - 0.5, height)}
+    columns |= dict.fromkeys(PWM, np.where((time > 0.9) & (time < 29.2), 40000.0 + np.arange(3000) % 9, 0.0))
+    segments = logs.segments(FlightLog(columns, {"source": "made", "warnings": []}))
+    assert [(s.start, s.stop) for s in segments if s.kind == "over platform"] == [(2101, 2400)]
+
+
 def test_a_down_range_without_a_value_is_not_the_ground():
     """With `zrange_m` all NaN the whole flight was on the ground, whatever `z_m` said."""
     motors = np.r_[np.zeros(200), np.full(1600, 40000.0), np.zeros(200)]
