@@ -35,7 +35,7 @@ def cell_table(cells: Iterable[Cell], title: str, width: int) -> Table:
     """A table of cells of a gap map for a terminal of a width; a column that says nothing is left out."""
     cells = list(cells)[:MOST_CELLS]
     table = Table(title=title, title_justify="left", caption_justify="left",
-                  caption="90 % intervals; a cell is listed when its interval clears the floor's")
+                  caption="90 % intervals; a cell is listed when its interval clears the floor's, or by the answer")
     columns = [(name, text) for name, (text, least) in CELL_COLUMNS.items()
                if width >= least and any(text(cell) for cell in cells)]
     for name, _ in columns:
