@@ -25,7 +25,7 @@ from airtouch.logs.formats.rosbag import is_bag
 @click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; the model's own if left out.")
-@click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write; the plot goes beside it as .png.")
+@click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write, a file of any ending; the plot goes beside it as .png.")
 @click.option("--force", is_flag=True, help="Replace both.")
 def command(flight: Path, detector: str, model: Path | None, truth: bool, speed: float | None, heading: float,
             sigma: float | None, out: Path | None, force: bool) -> None:
@@ -68,6 +68,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     for point in plane.points:
         click.echo(f"{point.kind:5} at {point.time_s:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")
+    if not plane.points:
+        click.echo("no edges found" + (" in the down range" if truth else f" by {detector}"))
     for number, platform in enumerate(plane.platforms):
         if platform.outline is not None:
             click.echo(f"platform {number}: {platform.outline.area:.3f} m^2, outline 1-sigma {platform.sigma_m:.3f} m")
