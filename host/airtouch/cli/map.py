@@ -25,7 +25,8 @@ from airtouch.logs.formats.rosbag import is_bag
 @click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; the model's own if left out.")
-@click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write, a file of any ending; the plot goes beside it as .png.")
+@click.option("--out", type=click.Path(path_type=Path),
+              help="GeoJSON to write, of any ending; the plot goes beside it as .png.")
 @click.option("--force", is_flag=True, help="Replace both.")
 def command(flight: Path, detector: str, model: Path | None, truth: bool, speed: float | None, heading: float,
             sigma: float | None, out: Path | None, force: bool) -> None:
