@@ -105,7 +105,7 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     median = _median_residual(residuals, cells[0].channel)
     signal = None if median is None else _signal(median, cells[0])
-    if signal is not None and any(t.name == GROUND_EFFECT for t in effects):
+    if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
                     _spectra(study, residuals, effects, channels), commands)
