@@ -69,6 +69,38 @@ def test_detect_and_evaluate_take_a_file_a_log_and_a_table(log, path):
     assert len({s["missed_count"] for s in scores}) == 1
 
 
+def test_a_table_of_every_second_row_has_the_period_of_its_clock(log, tmp_path):
+    half = at.to_pandas(log).iloc[::2]
+    assert half.attrs["sample_period_s"] == 0.01
+    with pytest.raises(AirTouchError, match="logged at 50 Hz, the detectors need 100 Hz"):
+        at.detect(half, "baseline")
+    at.write(half, tmp_path / "half.csv")
+    assert not at.read(tmp_path / "half.csv").meta["warnings"]
+
+
+@pytest.mark.parametrize("late_s, kept", [(0.35, 1.0), (0.0, 0.7)])
+def test_a_table_with_late_bursts_or_lost_rows_keeps_its_stated_period(log, late_s, kept):
+    table = at.to_pandas(log)
+    due = table["t_s"].to_numpy()
+    bursts = np.arange(len(due)) % 200 < 40  # 0.4 s in which packets wait, to come together
+    table["t_s"] = np.maximum.accumulate(np.where(bursts, due + late_s, due))
+    table = table[np.random.default_rng(0).random(len(due)) < kept]
+    assert at.from_pandas(table).meta["sample_period_s"] == 0.01
+
+
+@pytest.mark.parametrize("clock, remark", [
+    (lambda t: t[::-1], "the clock runs backwards"),
+    (lambda t: t[np.random.default_rng(0).permutation(len(t))], "runs back"),
+    (lambda t: t + 5.0 * (np.arange(len(t)) >= 1000), r"no sample in 5\.01 s before sample 1000;")])
+def test_detect_warns_of_a_clock_that_is_not_that_of_the_rows(log, clock, remark):
+    table = at.to_pandas(log)
+    table["t_s"] = clock(table["t_s"].to_numpy())
+    with pytest.warns(UserWarning, match=remark):
+        at.detect(table, "baseline")
+    (lines,) = at.evaluate(table, "baseline")["remarks"].values()
+    assert re.search(remark, lines[0])
+
+
 def test_the_speed_of_a_simulated_flight_is_known(log):
     speed = log.meta["condition"]["speed"]
     assert at.evaluate(log, "baseline")["per_flight"] == at.evaluate(log, "baseline", speed_mps=speed)["per_flight"]
@@ -192,6 +224,19 @@ def test_a_folder_stands_for_its_flights_and_a_list_is_no_flight(tmp_path):
         at.detect([])
     with pytest.raises(at.AirTouchError, match="no flight to score"):
         at.evaluate([])
+
+
+@pytest.mark.parametrize("arguments, message", [
+    ({"scenario": 3}, "a scenario is a name, a .toml file or an object, not 3"), ({"scenario": None}, "not None"),
+    ({"vehicle": 3}, "a vehicle is a name, a .toml file or an object, not 3"),
+    ({"without": "gust"}, r"without is a list of effects: \['gust'\]"), ({"without": 3}, "a list of effects, not 3"),
+    ({"without": [3]}, "given by its name, not 3"), ({"effects": "wind"}, "or pairs of both, not 'wind'"),
+    ({"effects": 3}, "or pairs of both, not 3"), ({"effects": ["wind"]}, "is a pair of its name and .*, not 'wind'"),
+    ({"effects": [3]}, "is a pair of its name"), ({"effects": {"wind": 3}}, "is a pair of its name"),
+    ({"effects": {3: {}}}, "given by its name, not 3")])
+def test_arguments_of_another_kind_are_refused_in_one_line(arguments, message):
+    with pytest.raises(AirTouchError, match=message):
+        at.simulate(**{"scenario": "hover", **arguments})
 
 
 def test_a_mission_is_simulated_by_its_name():

@@ -6,7 +6,7 @@
  *   desktop's bits.
  * Threads: no globals: different objects may be used at once; one object by one thread at a time.
  * Memory: streamingZScore_t alone, 40 bytes a column.
- * Cost: one division and one square root a value.
+ * Cost: two divisions a value and one square root a column, of a window; one of each a value, streaming.
  */
 #pragma once
 

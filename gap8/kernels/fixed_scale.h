@@ -35,7 +35,7 @@ typedef struct {
 /**
  * @brief The inputs of one sample from its features (both `columns` floats).
  *
- * The logarithm is a series within 3e-7 of log2, made of IEEE single operations alone, so
+ * The logarithm is a series within 4e-6 of log2, made of IEEE single operations alone, so
  * that every machine gives the same bits (build without contraction). One division a
  * column. NaN counts as FIXED_SCALE_SMALLEST; whoever calls resets the stream there.
  */

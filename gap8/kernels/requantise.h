@@ -57,7 +57,11 @@ typedef struct {
 } outputRange_t;
 
 static inline outputRange_t outputRange(const layerInt8_t *layer) {
-  return (outputRange_t){.zeroPoint = layer->outputZeroPoint, .min = layer->outputMin, .max = layer->outputMax};
+  outputRange_t range;
+  range.zeroPoint = layer->outputZeroPoint;
+  range.min = layer->outputMin;
+  range.max = layer->outputMax;
+  return range;
 }
 
 /** What one output channel needs. */
@@ -68,7 +72,11 @@ typedef struct {
 } requantiser_t;
 
 static inline requantiser_t requantiser(const layerInt8_t *layer, int32_t channel, outputRange_t range) {
-  return (requantiser_t){.multiplier = layer->multiplier[channel], .right = -layer->shift[channel], .range = range};
+  requantiser_t r;
+  r.multiplier = layer->multiplier[channel];
+  r.right = -layer->shift[channel];
+  r.range = range;
+  return r;
 }
 
 /**

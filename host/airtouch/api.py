@@ -80,8 +80,11 @@ def to_pandas(flight: "Flight") -> "DataFrame":
 def from_pandas(table: "DataFrame") -> FlightLog:
     """The flight log of a pandas table. Columns with other names than the log's are left out.
 
+    So is a `sample_period_s` in `attrs` that `t_s` contradicts: the rows are a part of the log, or resampled.
     Raises AirTouchError if no column has a name of the log, and for one that holds something else than numbers.
     """
+    from airtouch.logs.checks.readings import stated_period_fits
+
     names = [str(name) for name in table.columns if str(name) in COLUMNS]
     if not names:
         raise AirTouchError(f"no column of this table has a name of the flight log; it has "
@@ -93,6 +96,8 @@ def from_pandas(table: "DataFrame") -> FlightLog:
             columns[name] = table[name].to_numpy(dtype=float)
         except (TypeError, ValueError) as error:
             raise AirTouchError(f"column {name} of this table holds something else than numbers: {error}") from None
+    if "t_s" in columns and not stated_period_fits(meta.get("sample_period_s"), columns["t_s"]):
+        del meta["sample_period_s"]
     return FlightLog(columns, meta)
 
 
@@ -102,14 +107,16 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
 
     detector: best, paper, paper-stream, baseline, or an object with the interface `detector.registry.Detector`.
     model: file of a trained model, None for the shipped one. Returns a trace with `.edges` (sample, kind,
-    probability) and `.probability`, (n,), of being over a platform. Raises AirTouchError for a flight that lacks
-    channels or has another rate.
+    probability) and `.probability`, (n,), of being over a platform. Warns of what a score would suffer from, as
+    `evaluate` does in its remarks. Raises AirTouchError for a flight that lacks channels or has another rate.
     """
     from airtouch.detector import registry
     from airtouch.detector.evaluation import evaluate as scoring
 
     module, log = registry.get(detector), read(flight)
     scoring.check(log, scoring.spare_of(module))
+    for remark in scoring.remarks(log):
+        warnings.warn(f"{log.source}: {remark}", stacklevel=_caller_level())
     return module.run(log, registry.model_for(module, module.load(Path(model) if model else None), log))
 
 
@@ -174,8 +181,7 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
         if not isinstance(value, numbers.Integral) or value < least:
             raise AirTouchError(f"{name} must be a whole number from {least}, not {value!r}")
     scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
-    pairs = list(effects.items()) if isinstance(effects, Mapping) else list(effects)
-    logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=pairs, without=without, seed=seed))
+    logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=effects, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]
     if lost:
         raise AirTouchError(f"{len(lost)} of {flights} flights diverged; the first: {lost[0]}")
@@ -238,23 +244,18 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     from airtouch.logs.files import check_free
     from airtouch.twin import adapt as module
     from airtouch.twin import adapt_report
-    from airtouch.vehicle import DEFAULT_VEHICLE
 
     need("train", "training")
     _check_speed(speed_mps)
     out = Path(out)
     check_free(out, force)
-    if twin is not None and vehicle is not None:
-        raise AirTouchError("a twin has a vehicle of its own; leave vehicle out")
+    adapt_report.check_vehicle(twin, vehicle)
     files = _several(flights)
     if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
         raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
-    usable, left_out = adapt_report.readable(dataset.collect(files, speed_mps))
-    if not usable:
-        raise AirTouchError(left_out[0][1] if left_out else "no flight that can be trained on")
-    work, craft = out.with_suffix(".adapt"), _vehicle(DEFAULT_VEHICLE if vehicle is None else vehicle, ())
-    simulator = adapt_report.twin_for(usable, None if twin is None else Path(twin), craft, work, speed_mps=speed_mps,
-                                      seed=seed, bar=_stages(progress))
+    usable, left_out, simulator, work = adapt_report.prepared(
+        dataset.collect(files, speed_mps), out, None if twin is None else Path(twin), vehicle, speed_mps=speed_mps,
+        seed=seed, bar=_stages(progress))
     adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=best.load(None), seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
@@ -316,7 +317,7 @@ def _vehicle(named: Any, logs: Sequence[FlightLog]) -> "Vehicle":
         if warning:
             warnings.warn(python_words(warning), stacklevel=_caller_level())
         return craft
-    return vehicles.load(named) if isinstance(named, (str, Path)) else named
+    return named if isinstance(named, vehicles.Vehicle) else vehicles.load(named)
 
 
 def _caller_level() -> int:

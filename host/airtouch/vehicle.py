@@ -90,6 +90,8 @@ def load(name_or_path: str | Path = DEFAULT_VEHICLE) -> Vehicle:
 
     Raises AirTouchError with the file and the missing or unknown key.
     """
+    if not isinstance(name_or_path, (str, Path)):
+        raise AirTouchError(f"a vehicle is a name, a .toml file or an object, not {name_or_path!r}")
     path = Path(name_or_path)
     if path.suffix == ".toml":
         try:
@@ -132,22 +134,41 @@ def of_log(meta: Mapping[str, Any]) -> tuple[Vehicle, str | None]:
     return craft, f"the log names no vehicle; {craft.name} is assumed, --vehicle names another" if assumed else None
 
 
+def arm_pwm_of(meta: Mapping[str, Any]) -> float:
+    """Mean PWM above which the vehicle that a log's metadata name flies; that of `of_log` where they name no known one.
+    """
+    return of_log(meta)[0].arm_pwm
+
+
 def of_logs(logs: Iterable[FlightLog]) -> tuple[Vehicle, str | None]:
     """The vehicle of flights of one vehicle: `of_log` of the first of them.
 
-    Raises AirTouchError where two logs name different vehicles; a name that the reader assumed is none.
+    Raises AirTouchError where two logs name different vehicles.
     """
     first: Mapping[str, Any] | None = None
     named: dict[str, str] = {}
     for log in logs:
         first = log.meta if first is None else first
-        name = str(log.meta.get("vehicle") or "")
-        if name and log.meta.get("assumed_vehicle") != name:
+        if name := name_in(log.meta):
             named.setdefault(name, log.source)
     if len(named) > 1:
         pairs = [f"{name} flew {source}" for name, source in list(named.items())[:2]]
         raise AirTouchError(f"two vehicles: {', '.join(pairs)}; give flights of one, or --vehicle for all of them")
     return of_log(first or {})
+
+
+def name_in(meta: Mapping[str, Any]) -> str:
+    """The vehicle that a log's metadata name, "" for none; a name that the reader assumed is none."""
+    name = str(meta.get("vehicle") or "")
+    return name if meta.get("assumed_vehicle") != name else ""
+
+
+def other_baseline(flights: Iterable[str], baseline: Iterable[str]) -> list[str]:
+    """A note where baseline flights name a vehicle that none of the flights names; names as `name_in` gives them."""
+    named = sorted(set(flights) - {""})
+    others = sorted(set(baseline) - {"", *named})
+    return [f"the baseline names vehicle {', '.join(others)}, the flights {', '.join(named)}: what differs may be the "
+            "vehicles; take a baseline of the same one"] if named and others else []
 
 
 def unknown_name(meta: Mapping[str, Any]) -> str:

@@ -1,18 +1,21 @@
 """`airtouch ablate`, from the outside."""
 
 import json
+import shutil
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from airtouch import logs
 from airtouch.cli.learning.ablate import command
 from airtouch.detector import ablation, baseline, best
 from airtouch.detector.ablation import ABLATIONS, Ablation
 from airtouch.detector.evaluation import crossval
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.trace import Detection, Trace
+from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import NAMES, MotionConfig, motion_channels
 from made_flight import SMALL
 
@@ -85,3 +88,17 @@ def test_a_variant_and_the_detector_of_the_same_name_share_no_folds(generated, t
         detections.append(ablation.ablate(["baseline"], files, tmp_path)["baseline"]["detections"])
     assert detections == [0, 8]
     assert sum(score.detections for score in crossval.crossval("baseline", files, tmp_path).scores) > 8
+
+
+def test_flights_that_cannot_be_used_are_named_once_and_the_exit_code_says_so(generated, tmp_path, monkeypatch):
+    for name in ("best", "no-kick"):
+        monkeypatch.setitem(ABLATIONS, name, Ablation("channels", name, Fixed()))
+    folder = tmp_path / "flights"
+    shutil.copytree(generated, folder)
+    arguments = [folder, "--out", tmp_path / "folds", "--only", "best", "--only", "no-kick"]
+    whole = run(*arguments)
+    assert whole.exit_code == 0, whole.output
+    bad = folder / "f0.csv.gz"
+    logs.write(FlightLog({"t_s": np.arange(9) / 100.0, "zrange_m": np.ones(9)}, {}), bad, force=True)
+    part = run(*arguments)
+    assert part.exit_code == 2 and part.stderr.count(f"left out: {bad}") == 1, part.output

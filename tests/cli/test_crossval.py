@@ -70,7 +70,7 @@ def test_the_output_says_that_the_decoder_of_best_was_chosen_over_the_folds(gene
     assert result.exit_code == 0, result.output
     note = json.loads(out.read_text()).get("note", "")
     assert ("chosen over the five folds" in note) == (detector == "best")
-    assert ("note: the decoder's settings" in result.stdout) == (detector == "best")
+    assert ("note: the decoder's settings and the recipe" in result.stdout) == (detector == "best")
 
 
 def test_the_ledger_is_checked_before_the_work(generated, tmp_path, monkeypatch):

@@ -69,6 +69,7 @@ def test_few_flights_are_too_few(generated, tmp_path):
     (tmp_path / "one" / "f.csv").write_text("1,2\n")
     result = run("--out", tmp_path / "o", "--flights", tmp_path / "one")
     assert isinstance(result.exception, AirTouchError) and "too few" in str(result.exception)
+    assert not (tmp_path / "o").exists()
 
 
 def test_split_is_by_flight(generated, tmp_path):

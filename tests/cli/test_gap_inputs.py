@@ -1,5 +1,6 @@
 """What `airtouch gap` says of inputs and outputs that it cannot use."""
 
+import json
 import shlex
 
 import pytest
@@ -11,6 +12,7 @@ from airtouch.cli.gap import files
 from airtouch.cli.gap.blind import blind_run
 from airtouch.cli.gap.diagnose import diagnose_command
 from airtouch.cli.gap.measure import measure_command
+from airtouch.cli.gap.progress import StepLines
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 from airtouch.gap import diagnosis
@@ -73,6 +75,32 @@ def test_each_tells_a_flight_that_is_in_its_baseline_too(generated, monkeypatch)
     flight = str(generated / "f0.csv.gz")
     result = CliRunner().invoke(diagnose_command, [flight, "--each", "--baseline", flight])
     assert "cannot differ from itself" in result.output
+
+
+def test_each_names_the_flight_that_is_diagnosed_and_keeps_what_is_done(generated, tmp_path, monkeypatch):
+    """The third flight is broken off: it is the one that the progress names last, and two are in the JSON."""
+    steps, out, done = [], tmp_path / "out.json", []
+
+    def diagnose(flights, **_):
+        done.append(flights)
+        if len(done) == 3:
+            raise KeyboardInterrupt
+        return made_diagnosis.diagnosis()
+
+    monkeypatch.setattr(diagnosis, "diagnose", diagnose)
+    monkeypatch.setattr(StepLines, "__call__", lambda _, text: steps.append(text))
+    names = [str(generated / f"f{i}.csv.gz") for i in range(3)]
+    CliRunner().invoke(diagnose_command, [*names, "--each", "--json", str(out)])
+    assert steps[-1] == "diagnosing f2.csv.gz, step 2 of 3" and len(json.loads(out.read_text())["cases"]) == 2
+
+
+def test_a_copy_of_a_baseline_flight_under_another_name_is_told(generated, tmp_path, monkeypatch):
+    copy = tmp_path / "real.csv.gz"
+    copy.write_bytes((generated / "f1.csv.gz").read_bytes())
+    monkeypatch.setattr(diagnosis, "diagnose", lambda *_, **__: made_diagnosis.diagnosis())
+    result = CliRunner().invoke(diagnose_command, [str(copy), str(generated / "f0.csv.gz"),
+                                                   "--baseline", str(generated / "f1.csv.gz")])
+    assert "real.csv.gz: is a baseline flight as well" in result.output and "(1 of 2 flights)" in result.output
 
 
 def test_the_command_in_a_report_can_be_pasted_and_long_lists_are_counted(monkeypatch):

@@ -46,3 +46,8 @@ def test_the_first_page_names_every_command_in_a_whole_line():
     assert all(re.search(rf"^  {name} +\S", text, re.MULTILINE) for name in COMMANDS)
     gap = help_of(("airtouch", "gap"), airtouch.get_command(click.Context(airtouch), "gap"))
     assert "..." not in gap.split("\n", 1)[1] and "compare the" in gap
+
+
+@pytest.mark.parametrize("path, command", LEAVES, ids=[" ".join(path) for path, _ in LEAVES])
+def test_help_shows_no_range_without_bounds(path, command):
+    assert "None]" not in help_of(path, command)

@@ -111,6 +111,12 @@ def test_convert_keeps_samples_unless_a_rate_is_asked_for(folder):
     assert len(logs.read(out / "good.csv.gz")) == 120
 
 
+def test_convert_leaves_no_empty_folder_after_a_refusal(tmp_path):
+    (tmp_path / "bad.csv").write_text("1,2\n")
+    assert call("convert", tmp_path / "bad.csv", "--out", tmp_path / "new" / "out").exit_code == 2
+    assert not (tmp_path / "new").exists()
+
+
 def test_convert_never_replaces_its_input_or_another_result(folder):
     result = call("convert", folder / "good.csv", "--out", folder, "--format", "csv", "--force")
     assert result.exit_code == 2 and "a file to convert" in result.stderr

@@ -62,6 +62,20 @@ def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path):
     assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_edges_at_which_the_position_is_lost_are_counted(tmp_path):
+    log = zigzag_log()
+    log.columns["x_m"][2200:2500] = np.nan  # both edges of one row
+    logs.write(log, tmp_path / "zigzag.csv")
+    complete = len(logs.true_edges(log))
+    lost = sum(2200 <= edge.sample < 2500 for edge in logs.true_edges(log))
+    result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")
+    assert result.exit_code == 0, result.output
+    assert lost and f"left out: {lost} of {complete} edges" in result.output
+    content = json.loads((tmp_path / "map.geojson").read_text())
+    assert content["properties"]["edges_without_position"] == lost
+    assert sum(f["properties"]["role"] == "edge" for f in content["features"]) == complete - lost
+
+
 def test_without_position_the_edges_lie_along_the_track(tmp_path):
     logs.write(zigzag_log(with_position=False), tmp_path / "zigzag.csv")
     result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")

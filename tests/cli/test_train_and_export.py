@@ -18,7 +18,7 @@ from airtouch.cli.learning import export as export_command
 from airtouch.cli.learning import train as train_command
 from airtouch.detector import best, registry
 from airtouch.detector.evaluation.data import simulated
-from airtouch.detector.shared import vehicle_header
+from airtouch.detector.shared import training_set, vehicle_header
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import MotionConfig
 from made_flight import SMALL, made_flight
@@ -209,5 +209,7 @@ def test_best_goes_on_from_a_model_with_some_flights_and_free_air(tmp_path: Path
     assert "trained on 2 flights" in result.output
     metadata = best.load(tmp_path / "new.npz").metadata
     assert len(metadata["flights"]) == 3 and metadata["free_air"] == 1
+    assert training_set.contains(metadata, logs.read(tmp_path / "calm" / "f0.csv")), "free air is training data too"
+    assert not training_set.contains(metadata, made_flight(9))
     refusal = train(tmp_path / "mine", "--detector", "paper", "--labelled", 2, "--out", tmp_path / "m.npz")
     assert refusal.exit_code == 2 and "for --detector best" in refusal.output

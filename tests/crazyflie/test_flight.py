@@ -117,6 +117,25 @@ def test_a_drone_that_never_comes_back_is_given_up_after_a_minute(tmp_path):
     assert craft.clock() == pytest.approx(9.0 + 3.0 + 60.0, abs=0.5)
 
 
+def test_a_drone_that_falls_silent_after_a_refusal_is_given_up_after_a_minute(tmp_path):
+    """It waited for ever, also after Ctrl-C."""
+    class Craft(FakeCraft):
+        def _plan(self, command):
+            if command.kind == "go":
+                self.silent = [(self.now + 0.001, 1e9)]  # after its answer
+                return 16
+            return super()._plan(command)
+
+    def show(flight):
+        if craft.now > 120.0:
+            raise RuntimeError("it goes on for ever")
+
+    craft = Craft()
+    flight, _, ended = fly(craft, tmp_path, show=show)
+    assert "refuses go" in ended and ended.endswith("NO CONTACT for 60 s, land by hand") and not flight.landed
+    assert craft.now == pytest.approx(6.0 + 60.0, abs=1.0)
+
+
 @pytest.mark.parametrize("dead_link", [False, True])
 def test_a_drone_that_restarted_in_a_silence_gets_no_command_before_it_is_heard(tmp_path, dead_link):
     craft = FakeCraft(restart_at=12.0, silent=[(9.0, 12.5)], unheard=[(12.5, 14.0)], uptime_s=60,

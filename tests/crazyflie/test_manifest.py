@@ -1,15 +1,23 @@
 """The manifest of a folder of flights: what a flight counts as, and its row."""
 
 import csv
+import json
+import re
+from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from airtouch.cli import airtouch
 from airtouch.cli.drone.collect import _report
 from airtouch.crazyflie import manifest
 from airtouch.crazyflie.collect import Outcome, prepare_folder
+from airtouch.detector.evaluation.evaluate import truth
 from airtouch.errors import AirTouchError
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs import read, write
+from airtouch.logs.flight_log import PWM, FlightLog
 
 HEADER = "file,use,fold,height,angle_deg,wind,speed_mps"
 
@@ -39,6 +47,33 @@ def over_a_platform(height_m: float = 0.4) -> np.ndarray:
 ])
 def test_use_of_a_flight(lost_samples, zrange, planned, use):
     assert manifest.use_of(flight(lost_samples, zrange), planned) == use
+
+
+def light_flight(folder, vehicle) -> Path:
+    """A log of a drone that hovers at a PWM of 11,000, and takes off at 17,000, over a platform of 0.4 m."""
+    time = 0.01 * np.arange(2000)
+    pwm = np.where((time > 1) & (time < 19), 11000.0, 0.0)
+    pwm[(time > 1) & (time < 1.8)] = 17000.0
+    height = np.interp(time, [1, 3, 16, 18.5], [0.0, 0.8, 0.8, 0.0]) - 0.4 * ((time > 8) & (time < 12))
+    columns = {"t_s": time, "zrange_m": height} | dict.fromkeys(PWM, pwm)
+    log = FlightLog(columns, {"lost_samples": 0, "vehicle": vehicle})
+    write(log, folder / "light.csv")
+    return folder / "light.csv"
+
+
+def test_a_flight_is_in_the_air_from_its_own_vehicles_arm_pwm_on(tmp_path):
+    """A vehicle file of one's own, as flash.md has it; without one the level is 15,000, the Crazyflie's."""
+    text = (resources.files("airtouch") / "vehicles/crazyflie-2.1-brushless.toml").read_text()
+    (tmp_path / "mine.toml").write_text(re.sub(r"(?m)^arm_pwm = \d+", "arm_pwm = 8000", text))
+    for vehicle, use, edges in ((str(tmp_path / "mine.toml"), "clean", ["entry", "exit"]), ("", "free-air", []),
+                                ("unknown", "free-air", [])):
+        path = light_flight(tmp_path, vehicle)
+        log = read(path)
+        assert manifest.use_of(log, planned=True) == use
+        assert [edge.kind for edge in truth(log)] == edges
+        result = CliRunner().invoke(airtouch, ["logs", "check", str(path), "--json"])
+        assert result.exit_code == 0 and [e["kind"] for e in json.loads(result.stdout)["flights"][0]["edges"]] == edges
+        path.unlink()
 
 
 def test_the_reason_is_said_where_a_low_platform_makes_a_flight_messy(capsys, tmp_path):

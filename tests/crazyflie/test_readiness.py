@@ -1,11 +1,15 @@
 """A drone on the ground: what it is asked, and what is made of its answers."""
 
 import math
+import queue
+from threading import Event
 
 import pytest
 
 from airtouch.crazyflie import readiness
+from airtouch.crazyflie.checks import Condition
 from airtouch.crazyflie.connection import blocks
+from airtouch.crazyflie.connection.log_blocks import Sample
 from airtouch.errors import AirTouchError
 
 
@@ -64,3 +68,32 @@ def test_only_a_virtual_drone_starts_over():
 def test_the_origin_is_the_estimate_and_zero_where_there_is_none():
     origin = readiness.origin_of({"x_m": 0.3, "y_m": math.nan, "yaw_rad": -1.0})
     assert (origin.x_m, origin.y_m, origin.z_m, origin.yaw_rad) == (0.3, 0.0, 0.0, -1.0)
+
+
+class StandingDrone(Drone):
+    """A drone on the ground that sends packets; its down range reads so many millimetres."""
+
+    def __init__(self, zrange_mm):
+        super().__init__()
+        self.zrange_mm = zrange_mm
+
+    @property
+    def samples(self):
+        packets = queue.SimpleQueue()
+        values = dict.fromkeys(blocks.MOTION.names, 0.0) | {"range.zrange": self.zrange_mm, "pm.vbat": 4.0}
+        for index in range(3):
+            packets.put(Sample(blocks.MOTION.name, 10 * index, 0.01 * index, values))
+        return packets
+
+
+@pytest.mark.parametrize(("zrange_mm", "fault"), [(20, None), (290, None), (310, "reads 0.31 m"),
+                                                  (8191, "reads nan m")])
+def test_the_down_range_is_checked_again_before_each_flight(monkeypatch, zrange_mm, fault):
+    """It was read once, before the first of several flights."""
+    monkeypatch.setattr(readiness, "FIRST_DATA_S", 0.1)
+    before = readiness.Readiness(Condition(4.0, {"bcFlow2": True}, None, 0.02), None, "unknown")
+    if fault is None:
+        assert readiness.settle(StandingDrone(zrange_mm), before, 3.7, Event()).latest["vbat_V"] == 4.0
+        return
+    with pytest.raises(AirTouchError, match=f"not ready: the down range {fault} on the ground"):
+        readiness.settle(StandingDrone(zrange_mm), before, 3.7, Event())

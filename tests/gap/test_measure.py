@@ -73,6 +73,16 @@ def test_error_without_a_flight_is_that_of_the_flight_not_of_the_baseline(sweeps
     assert "nominal" not in str(error.value)
 
 
+@pytest.mark.parametrize(("real", "nominal", "noted"), [
+    ("ns-34g", "ns-67g", True), ("ns-34g", "ns-34g", False), ("", "ns-67g", False), ("ns-34g", "", False)])
+def test_a_baseline_of_another_vehicle_is_noted(sweeps, real, nominal, noted):
+    """--vehicle names one for all of them, so that the logs' two names are no error."""
+    of = [replace(log, meta={**log.meta, "vehicle": name}) for log, name in zip(sweeps, (real, nominal), strict=False)]
+    notes = measure(of[:1], VEHICLE, of[1:], calibrated=False).notes
+    assert [n for n in notes if "names vehicle ns-67g, the flights ns-34g" in n] == [n for n in notes if "ns-67g" in n]
+    assert any("ns-67g" in n for n in notes) == noted
+
+
 def test_a_flight_without_a_gyro_is_left_out_among_others_that_have_one(sweeps):
     """Its map is that of the others alone."""
     bare = FlightLog({k: v for k, v in sweeps[2].columns.items() if k not in GYRO}, {"source": "bare"})

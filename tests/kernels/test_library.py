@@ -51,6 +51,8 @@ WRONG = {
     "z_score_window": [(np.zeros(4),), (np.zeros((0, 3)),)],
     "streaming_z_score": [(np.zeros(4), 5.0), (np.zeros((4, 1)), -1.0)],
     "edge_pipeline": [(np.zeros((4, 3)), np.zeros((5, 3)), np.zeros((4, 4)), VEHICLE)],
+    "edge_decoder": [(np.zeros((5, 3)), np.ones(4, bool)), (np.zeros((5, 2)), np.ones(5, bool)),
+                     (np.zeros(5), np.ones(5, bool))],
 }
 
 
@@ -61,6 +63,27 @@ def test_wrong_shapes_are_one_line_in_both(module, name):
         with pytest.raises(AirTouchError) as error:
             getattr(module, name)(*arguments)
         assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("module", [kernels, reference], ids=["kernels", "reference"])
+@pytest.mark.parametrize("of_samples", [{"vbat_v": np.full(4, 3.9)}, {"thrust_axis": np.zeros((4, 3))},
+                                        {"probability": np.zeros(4)}], ids=str)
+def test_a_signal_that_is_not_of_these_samples_is_one_line_in_both(module, of_samples):
+    with pytest.raises(AirTouchError, match=r"must be \(5, ?3?\), or one for all samples, not \(4, ?3?\)"):
+        module.edge_pipeline(np.zeros((5, 3)), np.zeros((5, 3)), np.zeros((5, 4)), VEHICLE, **of_samples)
+
+
+@pytest.mark.parametrize("x", [np.zeros((400, 1)), np.zeros(400), np.zeros((400, 10))], ids=lambda x: str(x.shape))
+def test_a_bank_takes_its_own_number_of_channels_only(x):
+    with pytest.raises(AirTouchError, match=r"samples must be \(n, 9\)"):
+        kernels.BandPowerBank(9, 100.0, 200, (6.0, 8.0), 1).push(x)
+
+
+@pytest.mark.parametrize("cells", [256, 1000, 5000])
+def test_a_long_window_leaves_the_memory_of_others_alone(cells):
+    code = f"import airtouch.kernels as k; print([k.threshold_factor({cells}, 1e-6) for _ in range(20)][-1])"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert float(out) == pytest.approx(reference.threshold_factor(cells, np.float32(1e-6)), rel=1e-5)
 
 
 def test_pieces_of_a_stream_are_the_whole():

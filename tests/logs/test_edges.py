@@ -7,6 +7,7 @@ import pytest
 
 from airtouch import logs
 from airtouch.errors import AirTouchError
+from airtouch.logs.alignment import aligned_log
 from airtouch.logs.flight_log import PWM, FlightLog
 
 
@@ -71,6 +72,39 @@ def test_an_edge_between_readings_that_are_close_is_one(without):
     slow = FlightLog({"t_s": 0.2 * np.arange(80), "zrange_m": np.repeat([0.8, 0.05], 40)}
                      | {m: np.full(80, 40000.0) for m in PWM}, {})
     assert [e.sample for e in logs.true_edges(slow)] == [40]  # at 5 Hz no reading is closer than 0.2 s
+
+
+GAPS = [0.04, 0.11, 0.15, 0.156, 0.18, 0.21, 0.25, 0.3, 0.35, 0.41]  #: s; a step over more than 0.15 s is no edge
+
+
+@pytest.mark.parametrize("gap_s", GAPS)
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 200.0])
+@pytest.mark.parametrize("rows_lost", [False, True])
+def test_a_log_has_its_edges_before_and_after_resampling(gap_s, rate_hz, rows_lost):
+    time = 0.002 * np.arange(4000)
+    unread = (time > 4.0 + 1e-9) & (time < 4.0 + gap_s - 1e-9)
+    height = np.where(time > 4.0 + 1e-9, 0.3, 0.8)
+    log = flight(np.where(unread, np.nan, height)).with_columns({"t_s": time}, sample_period_s=0.002)
+    if rows_lost:
+        log = FlightLog({name: values[~unread] for name, values in log.columns.items()}, log.meta)
+    edges, after = logs.true_edges(log), logs.true_edges(logs.resample(log, rate_hz))
+    assert [e.kind for e in edges] == [e.kind for e in after] == ["entry"] * (gap_s <= 0.15)
+    for e, f in zip(edges, after, strict=True):
+        assert f.sample / rate_hz == pytest.approx(log["t_s"][e.sample], abs=0.05)
+
+
+@pytest.mark.parametrize("gap_s", GAPS)
+@pytest.mark.parametrize("first_s", [4.0, 4.003, 4.0075])
+@pytest.mark.parametrize("invalid", [False, True])
+def test_a_log_of_several_clocks_has_no_edge_over_a_long_gap(gap_s, first_s, invalid):
+    """As ULog files and bags have them; invalid: the sensor says so every 40 ms, else it is silent."""
+    imu = 0.01 * np.arange(800)
+    before, after = first_s - 0.04 * np.arange(90)[::-1], first_s + gap_s + 0.04 * np.arange(80)
+    between = np.arange(first_s + 0.04, first_s + gap_s - 0.001, 0.04) if invalid else np.empty(0)
+    height = np.r_[np.full(90, 0.8), np.full(len(between), np.nan), np.full(80, 0.3)]
+    log = aligned_log({"gyro_x_radps": (imu, imu), "zrange_m": (np.r_[before, between, after], height)}
+                      | {m: (imu, np.full(800, 40000.0)) for m in PWM}, {"source": "made"})
+    assert [e.kind for e in logs.true_edges(log)] == ["entry"] * (gap_s <= 0.15)
 
 
 def test_a_step_on_the_ground_is_no_edge_and_edges_need_a_range():

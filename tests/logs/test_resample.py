@@ -68,10 +68,10 @@ def test_steps_are_held_angles_unwrapped_motors_in_range():
 
 
 def test_a_slow_battery_and_range_are_held_between_their_readings():
-    """Logged at 1 Hz and 5 Hz among rows of 100 Hz, 99 of 100 samples of the battery were lost."""
+    """Logged at 1 Hz and 10 Hz among rows of 100 Hz, 99 of 100 samples of the battery were lost."""
     t = np.arange(1600) / 100.0
     volts = np.where(t < 8.0, np.where(np.arange(1600) % 100 == 0, 4.0 - 0.01 * np.floor(t), np.nan), np.nan)
-    height = np.where((np.arange(1600) % 20 == 0) & (t < 8.0), 0.8, np.nan)
+    height = np.where((np.arange(1600) % 10 == 0) & (t < 8.0), 0.8, np.nan)
     new = logs.resample(FlightLog({"t_s": t, "vbat_V": volts, "zrange_m": height}, {"source": "made"}), 50.0)
     logged = new["t_s"] < 12.0 - 1e-6  # the last one at 7 s, and 5 s more
     np.testing.assert_allclose(new["vbat_V"][logged], 4.0 - 0.01 * np.minimum(np.floor(new["t_s"][logged] + 1e-6), 7))

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from airtouch.logs import true_edges
+from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.variables import to_columns
 
 G = 9.81  #: m/s^2, as the firmware has it
@@ -43,10 +45,45 @@ def test_of_two_variables_for_a_column_the_whole_one_is_taken():
     assert volts["vbat_V"][0] == 3.9
 
 
+def test_an_axis_is_converted_without_the_others_of_its_group():
+    """A uSD configuration that logs what a hover needs lost it all, without a warning."""
+    columns, meta = converted(acc__z=[1], stateEstimate__vx=[0.1], stateEstimate__vy=[0.2], stateEstimateZ__z=[800],
+                              gyro__xRaw=[32.768])
+    assert {name: values[0] for name, values in columns.items()} == pytest.approx({
+        "acc_z_mps2": G, "vx_mps": 0.1, "vy_mps": 0.2, "z_m": 0.8, "gyro_x_radps": np.radians(2.0)})
+    assert meta == {"warnings": [], "acc_frame": "body"}
+
+
+def test_a_whole_group_is_taken_before_an_axis_of_another():
+    both, _ = converted(stateEstimate__x=[7], stateEstimateZ__x=[1000], stateEstimateZ__y=[2000],
+                        stateEstimateZ__z=[3000])
+    assert [both[f"{a}_m"][0] for a in "xyz"] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("logged", ["motor.m1", "rpm.m3", "stateEstimate.az", "stateEstimate.qw",
+                                    "stateEstimateZ.rateRoll"])
+def test_variables_that_need_the_others_of_their_group_are_named(logged):
+    columns, meta = converted(**{logged.replace(".", "__"): [1.0], "gyro__x": [0], "gyro__y": [0], "gyro__z": [0]})
+    assert list(columns) == ["gyro_x_radps", "gyro_y_radps", "gyro_z_radps"]
+    assert len(meta["warnings"]) == 1 and meta["warnings"][0].startswith(f"{logged} left out, as ")
+
+
 def test_a_range_of_zero_is_near_below_and_no_answer_to_the_side():
-    columns, _ = converted(range__zrange=[0, 32766, 32767], range__front=[0, 32766, 32767])
-    assert np.array_equal(columns["zrange_m"], [0, 32.766, np.nan], equal_nan=True)
-    assert np.array_equal(columns["range_front_m"], [np.nan, 32.766, np.nan], equal_nan=True)
+    columns, _ = converted(range__zrange=[0, 400, 32767], range__front=[0, 400, 32767])
+    assert np.array_equal(columns["zrange_m"], [0, 0.4, np.nan], equal_nan=True)
+    assert np.array_equal(columns["range_front_m"], [np.nan, 0.4, np.nan], equal_nan=True)
+
+
+@pytest.mark.parametrize("outlier_mm", [5000, 8191, 65535])  # zranger2.c: "outliers typically occur as >8 [m]"
+def test_a_down_range_that_the_firmware_rejects_is_no_edge(outlier_mm):
+    n = 1000
+    millimetres = np.full(n, 800.0)
+    millimetres[500:540] = outlier_mm
+    motors = {f"motor__m{i}": 40000 + np.arange(n) % 7 for i in (1, 2, 3, 4)}
+    columns, _ = converted(range__zrange=millimetres, **motors)
+    log = FlightLog({"t_s": 0.01 * np.arange(n), **columns}, {"source": "x", "format": "usd", "warnings": []})
+    assert np.isnan(log["zrange_m"][500:540]).all() and np.isfinite(log["zrange_m"]).sum() == n - 40
+    assert true_edges(log) == []
 
 
 def test_accelerations_of_the_estimate_turn_into_the_body():

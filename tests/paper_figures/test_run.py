@@ -112,12 +112,47 @@ def test_done_figures_stay_and_damaged_ones_are_made_again(figures, tmp_path):
     assert len(figures) == 4
 
 
+def test_force_makes_again_what_the_work_folder_holds(monkeypatch, tmp_path):
+    """The code changes between the runs, which no key of what is stored can see."""
+    code = ["old"]
+
+    def stored(path):
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(code[0])
+        return path.read_text()
+
+    def works(job):
+        paths = ("folds/best_fold0_0.json", "folds/best_fold0_0.npz", "vision_12_24_5_0.json")
+        read = " ".join(stored(job.work / path) for path in paths)
+        verdicts = {name: Verdict(REPRODUCED, read) for name in ("height-4cm", "height-9cm")}
+        return Figure("Works", [{"what": read}], "", verdicts, lambda canvas: canvas.subplots())
+
+    module = types.ModuleType("airtouch.paper_figures.figures.made_up")
+    module.works = works
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(run, "FIGURES", {"fig8d": ("made_up", "works")})
+    job = Job(None, tmp_path / "work")
+    run.run(["fig8d"], tmp_path, job)
+    (tmp_path / "work" / "notes.txt").write_text("of the user")
+    code[0] = "new"
+    run.run(["fig8d"], tmp_path, job, force=True)
+    assert (tmp_path / "fig8d.csv").read_text() == "what\nnew new new\n"
+    assert (tmp_path / "work" / "notes.txt").exists()
+
+
 def test_figures_of_other_settings_are_not_replaced_unasked(figures, tmp_path):
     run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"))
     with pytest.raises(AirTouchError, match="fig8d.csv was made with other settings; use --force"):
         run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True))
     run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True), force=True)
     assert figures == [False, True] and json.loads((tmp_path / "fig8d.json").read_text())["quick"]
+
+
+def test_a_whole_run_replaces_the_figures_of_a_quick_one(figures, tmp_path):
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work", quick=True))
+    run.run(["fig8d"], tmp_path, Job(None, tmp_path / "work"))
+    assert figures == [True, False] and not json.loads((tmp_path / "fig8d.json").read_text())["quick"]
 
 
 def test_a_figure_is_stale_by_what_it_reads_alone(figures, tmp_path):
@@ -151,6 +186,13 @@ def test_the_command_says_each_verdict_and_that_something_is_missing(figures, tm
         run.names(["fig8x"])
     missing = CliRunner().invoke(command, ["--flights", str(tmp_path / "none"), "--out", str(tmp_path)])
     assert "no such file or folder" in str(missing.exception)
+
+
+def test_a_power_log_that_no_chosen_figure_reads_is_refused(tmp_path):
+    (tmp_path / "run.json").write_text("{}")
+    result = CliRunner().invoke(command, ["--only", "range", "--power-log", str(tmp_path / "run.json"),
+                                          "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2 and "--power-log is for table1" in result.stderr and not (tmp_path / "out").exists()
 
 
 def test_processes_make_the_same_figures(tmp_path):

@@ -145,6 +145,7 @@ def test_flow_sees_the_distance_to_what_is_below():
     estimator, _ = after((0.8, 0, 1.0, 0.0, 0.8), (0.3, 25, 1.0, 0.0, 0.8))
     assert estimator.flow(0.8) == pytest.approx(0.3 / 0.8)
     assert estimator.flow(0.52) == pytest.approx(0.08 / 0.52), "no nearer than 8 cm"
+    assert estimator.flow(float("nan")) == 1.0, "as in C"
     assert estimator.flow(0.08) == 1.0 == estimator.flow(0.05) == FloorHeight().flow(0.8)
     below, _ = after((0.8, 0, 1.0, 0.0, 0.8), (1.2, 25, 1.0, 0.0, 0.8))
     assert below.flow(0.8) == pytest.approx(1.5) and below.flow(0.08) == 1.0 == below.flow(0.0)

@@ -82,3 +82,12 @@ def test_an_impossible_vehicle_is_refused_with_the_name_of_its_field(line):
     text = re.sub(rf"(?m)^{name}\s*=.*\n", "", text) + line + "\n"
     with pytest.raises(AirTouchError, match=f"mine.toml: {name}"):
         vehicles.parse(text, "mine.toml")
+
+
+def test_a_firmware_file_that_was_edited_flies_as_it_is_now(tmp_path):
+    path = tmp_path / "mine.toml"
+    craft = replace(vehicles.load("crazyflie-2.1"), firmware=str(path))
+    for command in (36000.0, 46000.0, 36000.0):
+        path.write_text(f'base = "2026.08"\n[controller]\nthrust_base = {command}\n')
+        plant = from_vehicle(craft)[0]
+        assert plant["thrust_base"] == plant["firmware"]["controller"]["thrust_base"] == command

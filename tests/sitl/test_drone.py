@@ -91,6 +91,19 @@ def test_watchdog_levels_out_and_then_stops(bench):
     assert not craft.drone.motors_on
 
 
+def test_a_drone_without_thrust_does_not_fly_and_is_not_locked(bench):
+    """As isFlyingCheck: flying needs a motor ratio above idle, and only a flying drone is locked."""
+    craft = bench(**QUIET)
+    craft.take(COMMANDER, 0, struct.pack("<fffH", 0.0, 0.0, 0.0, 0))  # unlocks the thrust; then silence
+    for _ in range(30):
+        craft.fly(0.1)
+        assert not craft.drone.row[7:11].any(), "no motor turns"
+        assert not craft.drone.motors_on and not craft.drone.is_flying and craft.drone.took_off_s is None
+    assert craft.drone.state == PRE_FLIGHT and craft.drone.commander.timed_out
+    keep(craft, 3.0, HOVER, 0.0, 0.0, 0.0, 0.5)
+    assert craft.height == pytest.approx(0.5, abs=0.12)
+
+
 def test_the_high_level_commander_needs_no_radio_and_gives_way(bench):
     craft = bench(**QUIET)
     craft.take_off(0.5)

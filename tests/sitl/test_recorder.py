@@ -5,18 +5,21 @@ import time
 import numpy as np
 import pytest
 
+import airtouch as at
 from airtouch import logs
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import COLUMNS
 from airtouch.sitl import Server, serve
 from airtouch.sitl.recorder import Recorder
 
+META = {"scenario": "sweep", "seed": 3, "sample_period_s": 0.01}
+
 
 def test_rows_are_read_back_to_a_millionth(tmp_path):
     rows = np.random.default_rng(0).normal(size=(50, len(COLUMNS)))
     rows[:, 0] = 0.01 * np.arange(50)
     row = np.empty(len(COLUMNS))
-    recorder = Recorder(tmp_path / "a.csv.gz", "sweep", "crazyflie-2.1-flow", 3, 0, force=False)
+    recorder = Recorder(tmp_path / "a.csv.gz", META, force=False)
     for values in rows:
         row[:] = values  # the caller's row is its own again after `add`
         recorder.add(row)
@@ -27,20 +30,34 @@ def test_rows_are_read_back_to_a_millionth(tmp_path):
     assert (log.meta["scenario"], log.meta["seed"], log.meta["sample_period_s"]) == ("sweep", 3, 0.01)
 
 
+def test_a_recording_names_what_simulate_names(tmp_path):
+    """But the drawn speed: how fast it flew the client knows, and `evaluate` would take the drawn one for it."""
+    chosen = {"effects": {"wind": {"x": 0.5}}, "seed": 3}
+    with serve("paper-4cm", port=0, speed=50.0, record=tmp_path / "a.csv", flight=2, **chosen) as sitl:
+        while sitl.drone.ticks < 10:
+            time.sleep(0.01)
+    recorded, simulated = logs.read(tmp_path / "a.csv").meta, at.simulate("paper-4cm", flights=3, **chosen)[2].meta
+    assert dict(recorded["effects"])["wind"]["x"] == 0.5
+    for key in ("effects", "firmware", "range_module", "vehicle", "scenario", "seed", "flight"):
+        assert recorded[key] == simulated[key], key
+    assert {"speed": simulated["condition"]["speed"], **recorded["condition"]} == simulated["condition"]
+    assert "speed" not in recorded["condition"]
+
+
 def test_a_session_without_rows_writes_nothing(tmp_path):
-    Recorder(tmp_path / "a.csv.gz", "sweep", "crazyflie-2.1-flow", 0, 0, force=False).write()
+    Recorder(tmp_path / "a.csv.gz", META, force=False).write()
     assert not list(tmp_path.iterdir())
 
 
 def test_an_existing_file_and_a_folder_that_cannot_be_made_are_refused_before_the_session(tmp_path):
     (tmp_path / "a.csv").write_text("mine")
     with pytest.raises(AirTouchError, match="exists already; use --force"):
-        Recorder(tmp_path / "a.csv", "", "", 0, 0, force=False)
+        Recorder(tmp_path / "a.csv", {}, force=False)
     with pytest.raises(AirTouchError, match="a.csv: cannot be made"):
-        Recorder(tmp_path / "a.csv" / "b.csv", "", "", 0, 0, force=True)
+        Recorder(tmp_path / "a.csv" / "b.csv", {}, force=True)
     with pytest.raises(AirTouchError, match="is a folder"):
-        Recorder(tmp_path, "", "", 0, 0, force=True)
-    Recorder(tmp_path / "a.csv", "", "", 0, 0, force=True)
+        Recorder(tmp_path, {}, force=True)
+    Recorder(tmp_path / "a.csv", {}, force=True)
     assert (tmp_path / "a.csv").read_text() == "mine"  # replaced at the end alone
 
 

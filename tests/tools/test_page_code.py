@@ -63,6 +63,17 @@ def test_the_type_checker_knows_what_each_function_returns(tmp_path, monkeypatch
         assert "Revealed type" in line and returned in line, lines
 
 
+@pytest.mark.parametrize("page", ["gap-floor", "gap-relations", "twin-method", "kernels"])
+def test_the_python_of_a_page_prints_what_stands_below_it(page, capsys):
+    """Blocks that need no files, in their order, with the names of those before them."""
+    shown = re.findall(r"^```python\n(.*?)^```\n+```\n(.*?)^```", (DOCS / f"{page}.md").read_text("utf-8"), re.S | re.M)
+    assert shown
+    names: dict[str, object] = {}
+    for source, output in shown:
+        exec(source, names)
+        assert capsys.readouterr().out == output
+
+
 def test_the_toml_of_the_pages_is_accepted(tmp_path):
     scene, firmware = blocks(DOCS / "simulate.md", "toml")
     drawn = scenario.parse(scene, "simulate.md")

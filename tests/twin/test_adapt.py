@@ -254,6 +254,34 @@ def test_the_lag_is_that_of_recorded_flights(sweeps, trainings):
     assert best.with_lag(trained(0), ([log], [[]]), ([log], [early])).metadata["lag_s"] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize("of_scenario", [False, True])
+def test_stages_with_another_firmware_or_version_are_made_anew(sweeps, tmp_path, monkeypatch, of_scenario):
+    path = tmp_path / "mine.toml"
+    scene, craft = scenario.load(calibrate.PLAIN), vehicles.load("crazyflie-2.1-flow")
+    if of_scenario:
+        scene = replace(scene, table={**scene.table, "firmware": str(path)})
+    else:
+        craft = replace(craft, firmware=str(path))
+    flights, names = flights_of(sweeps, 2), []
+
+    class Stopped(Exception):
+        pass
+
+    def responses(*of):
+        names[-1].append(of[-1].name)
+        raise Stopped
+
+    monkeypatch.setattr(overlay, "simulate_responses", responses)
+    for version, command in (("1", 36000), ("1", 46000), ("1", 36000), ("2", 36000)):
+        path.write_text(f'base = "2026.08"\n[controller]\nthrust_base = {command}\n')
+        monkeypatch.setattr("airtouch.twin.cache.__version__", version)
+        names.append([adapt._key(flights, scene, craft, None, 0)])
+        with pytest.raises(Stopped):
+            adapt.simulated_flights(flights, scene, craft, 0, None, tmp_path)
+    for a, b, c, d in zip(*names, strict=True):
+        assert a == c and len({a, b, d}) == 3
+
+
 def score(error_m):
     edges = (EdgeScore("entry", 100, 100, "entry", 0.1, error_m), EdgeScore("exit", 200, 200, "exit", 0.1, error_m))
     return FlightScore("a", Condition(speed_mps=0.3), edges, (), 2, 20.0)

@@ -12,6 +12,7 @@ the lag of each fold's scores; `lag_s` and `parameters` are those that are best 
 
 import argparse
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -189,12 +190,20 @@ def candidates(count: int, rng: np.random.Generator, hold: int) -> list[DecoderC
     return out
 
 
+def shipped(silent: Sequence[str]) -> tuple[str, DecoderConfig]:
+    """(what they are, the settings that `best` decodes a log without these sensors with)."""
+    title = "as shipped"
+    if "acceleration" in silent:
+        title = "as a model of all sensors has them (for logs without acceleration another model ships)"
+    return title, next((best.DECODER_WITHOUT[name] for name in silent if name in best.DECODER_WITHOUT), best.DECODER)
+
+
 def main() -> None:
     """Search, then print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, nargs="+", help="folders of `airtouch crossval --detector best --out`")
     parser.add_argument("--count", type=whole_number(1), default=1000, help="settings tried (default %(default)s)")
-    parser.add_argument("--hold", type=whole_number(0), default=best.DECODER.hold_steps,
+    parser.add_argument("--hold", type=whole_number(0),
                         help="steps after its crossing at which an edge is reported (default: as shipped)")
     parser.add_argument("--silence", action="append", choices=sensors.SENSORS, default=[],
                         help="decode the flights without this sensor")
@@ -206,10 +215,12 @@ def main() -> None:
         if not any(out.glob(FOLDS)):
             raise AirTouchError(f"{out}: no models of `best`: airtouch crossval --detector best --out {out}")
     flights = [flight for out in options.out for flight in flights_of(need_flights(), out, tuple(options.silence))]
-    settings = candidates(options.count, np.random.default_rng(0), options.hold)
-    results = [outcomes(flights, config) for config in with_bar(settings, "settings")]
-    print_figures("as shipped", flights, outcomes(flights, best.DECODER))
-    print_figures("as shipped, but reporting at once", flights, outcomes(flights, replace(best.DECODER, hold_steps=0)))
+    title, config = shipped(options.silence)
+    hold = config.hold_steps if options.hold is None else options.hold
+    settings = candidates(options.count, np.random.default_rng(0), hold)
+    results = [outcomes(flights, candidate) for candidate in with_bar(settings, "settings")]
+    print_figures(title, flights, outcomes(flights, config))
+    print_figures(f"{title}, but reporting at once", flights, outcomes(flights, replace(config, hold_steps=0)))
     winner = cheapest(flights, results)
     print_figures("one setting, best over all folds", flights, results[winner])
     print(json.dumps(asdict(settings[winner])))

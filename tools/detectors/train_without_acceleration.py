@@ -50,6 +50,14 @@ def fit(flights: Sequence[adapt.LoadedFlight], twin: Path, air: Sequence[FlightL
                     lag_of=(recorded, own), progress=progress)
 
 
+def training_files(folders: Sequence[Path], hold_out: int | None) -> list[dataset.FlightFile]:
+    """The flights of the folders without those of the fold `hold_out`; all of them for None, also flights of no fold.
+
+    Raises as `dataset.collect` does.
+    """
+    return [f for f in dataset.collect(folders) if hold_out is None or f.condition.fold != hold_out]
+
+
 def main() -> None:
     """Read, train, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -66,7 +74,7 @@ def main() -> None:
         parser.error("--least is a fraction: more than 0, at most 1")
     check_free(options.out, options.force)
     scenario.load(options.twin / files.SCENARIO)  # before the flights are read
-    listed = [f for f in dataset.collect(options.folders, None) if f.condition.fold != options.hold_out]
+    listed = training_files(options.folders, options.hold_out)
     readable = crossval.all_readable(listed, best.SPARE_SENSORS)
     air = free_air.read(options.free_air) if options.free_air else []
     flights = [adapt.LoadedFlight(f, readable[f.path]) for f in listed]

@@ -30,6 +30,7 @@ static float bandLow(const appParams_t *params) { return params->bandMid - 0.5f 
 
 static float bandHigh(const appParams_t *params) { return params->bandMid + 0.5f * params->bandWidth; }
 
+/** The pipeline's settings cannot fail: appParamsClamp keeps each within what the pipeline takes. A test tries them all. */
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
   edgePipelineDefaults(&config, &core->vehicle);
@@ -37,7 +38,7 @@ static void beginPipeline(appCore_t *core) {
   config.lowHz = bandLow(&core->params);
   config.highHz = bandHigh(&core->params);
   config.pFa = core->params.pFa;
-  edgePipelineInit(&core->pipeline, &config);
+  (void)edgePipelineInit(&core->pipeline, &config);
   core->nonFinite = 0;
 }
 
@@ -121,7 +122,7 @@ void appCoreSetVehicle(appCore_t *core, const airtouchVehicle_t *vehicle, float 
 
 /** Networks of the band's features begin a new stream with another band. `best` uses no band. */
 static void changeBand(appCore_t *core) {
-  edgePipelineSetBand(&core->pipeline, bandLow(&core->params), bandHigh(&core->params));
+  (void)edgePipelineSetBand(&core->pipeline, bandLow(&core->params), bandHigh(&core->params));
   if (appPaperOf(core->detector) != NULL) {
     core->probability = NAN;
     core->log.probability = NAN;
@@ -145,7 +146,7 @@ uint16_t appCoreSetParams(appCore_t *core, appParams_t *params) {
     changeBand(core);
   }
   if (params->pFa != old.pFa) {
-    edgePipelineSetFalseAlarm(&core->pipeline, params->pFa);
+    (void)edgePipelineSetFalseAlarm(&core->pipeline, params->pFa);
   }
   setThresholds(core);
   return errors;

@@ -20,10 +20,10 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.evaluation.score_report import score_report, shown_flights
 from airtouch.errors import AirTouchError
 from airtouch.extras import need
-from airtouch.logs.files import make_folder
+from airtouch.logs.files import make_folder, no_empty_folders
 
 EPOCHS, STEPS = 8, 800  #: epochs of `paper`, training steps of `best`: two minutes on two cores
-SCORED = ("best", "paper", "baseline")  #: detectors
+SCORED = ("best", "paper", "baseline")  #: detectors, the best first
 SHOWN = 4  #: flights plotted in the report
 COMPILES = "the first time compiles the simulator, which takes a minute"
 
@@ -53,6 +53,7 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
         raise AirTouchError(f"{report}: exists already; use --force to replace it")
     if not force and any((out / "model").glob("*")):
         raise AirTouchError(f"{out / 'model'}: holds a model already; use --force to replace it")
+    click.get_current_context().with_resource(no_empty_folders(out))
     make_folder(out)
     headings = Headings(started)
 
@@ -67,15 +68,14 @@ def command(out: Path, flights: Path | None, speed: float | None, epochs: int, f
 
     headings.say(f"Training, short: {epochs} epochs, pruned, int8; thresholds from training flights")
     short = {"paper": {"epochs": epochs}, "best": {"steps": STEPS}}
-    names = sorted(SCORED, key=order)
-    models = {name: fit(name, training, short.get(name, {})) for name in names}
+    models = {name: fit(name, training, short.get(name, {})) for name in SCORED}
 
     headings.say("Export: C sources for the GAP8")
     export({name: models[name] for name in ("paper", "best")}, out / "model")
 
     headings.say("Detection on the held-out flights, through the C kernels and the C int8 network")
     results = {name: detect(name, model, test, left_out) for name, model in models.items()}
-    if not results[names[0]]:
+    if not results[SCORED[0]]:
         raise AirTouchError(f"no flight could be scored; the first was left out because: {left_out[0][1]}")
     scored = score_report({name: [r.score for r in of_detector] for name, of_detector in results.items()},
                           shown_flights(results, SHOWN))
@@ -121,11 +121,6 @@ def detect(name: str, model: Any, flights: Sequence[FlightFile],
     _, failures = evaluate.evaluate(flights, registry.get(name), model, outcomes.append)
     left_out += [f for f in failures if f not in left_out]
     return [r for r in outcomes if isinstance(r, evaluate.Result)]
-
-
-def order(name: str) -> int:
-    """The best detector first, the paper's baseline last."""
-    return SCORED.index(name)
 
 
 def export(models: dict[str, Any], folder: Path) -> None:

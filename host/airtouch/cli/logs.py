@@ -17,6 +17,7 @@ from airtouch.cli.shared.options import Finite
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write
 from airtouch.logs.formats.rosbag import is_bag
+from airtouch.vehicle import arm_pwm_of
 
 RERUN = "rrd"  #: ending of Rerun files, which are only written
 WRITTEN = ("csv", "csv.gz", "parquet", RERUN)
@@ -38,6 +39,16 @@ def command() -> None:
     """
 
 
+def _summary(path: Path) -> dict[str, Any]:
+    log = logs.read(path)
+    return logs.summary(log, arm_pwm_of(log.meta))
+
+
+def _report(path: Path) -> dict[str, Any]:
+    log = logs.read(path)
+    return logs.check(log, arm_pwm_of(log.meta)).as_dict()
+
+
 @command.command()
 @FILES
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
@@ -48,7 +59,7 @@ def info(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs info flights/*.csv.gz
     """
-    summaries, left_out = _each(_inputs(files), lambda path: logs.summary(logs.read(path)))
+    summaries, left_out = _each(_inputs(files), _summary)
     if as_json:
         _print_json(summaries, left_out)
     else:
@@ -68,7 +79,7 @@ def check(files: tuple[str, ...], as_json: bool) -> None:
     Example:
       airtouch logs check flights/ --json > quality.json
     """
-    reports, left_out = _each(_inputs(files), lambda path: logs.check(logs.read(path)).as_dict())
+    reports, left_out = _each(_inputs(files), _report)
     if as_json:
         _print_json(reports, left_out)
     else:
@@ -102,7 +113,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
       airtouch logs convert log00 log01 --out converted --rate 100
     """
     from airtouch.extras import need
-    from airtouch.logs.files import make_folder, write_bytes
+    from airtouch.logs.files import make_folder, no_empty_folders, write_bytes
     from airtouch.logs.formats import canonical, mapped, rerun_file
 
     if plain and ending != "csv":
@@ -112,6 +123,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
     if mapping:
         mapped.load(mapping)
     folder = Path(out)
+    click.get_current_context().with_resource(no_empty_folders(folder))
     make_folder(folder)
     written: set[Path] = set()
     inputs = _inputs(files)

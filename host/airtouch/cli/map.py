@@ -24,7 +24,7 @@ from airtouch.logs.formats.rosbag import is_bag
                    "position.")
 @click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
-              help="Timing error of a detection; the model's own if left out.")
+              help="Timing error of a detection; that of the model, or 0.1 s, if left out.")
 @click.option("--out", type=click.Path(path_type=Path),
               help="GeoJSON to write, of any ending; the plot goes beside it as .png.")
 @click.option("--force", is_flag=True, help="Replace both.")
@@ -61,7 +61,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
                               speed_mps=speed, heading_deg=heading)
     content = edge_map.geojson(plane.points, plane.platforms, {
         "flight": flight.name, "detector": "truth" if truth else detector, "position": plane.position,
-        "lag_s": plane.lag_s, "sigma_s": plane.sigma_s})
+        "lag_s": plane.lag_s, "sigma_s": plane.sigma_s, "edges_without_position": plane.without_position})
     from airtouch.report.map_figure import draw_edge_map
 
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
@@ -69,7 +69,10 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     for point in plane.points:
         click.echo(f"{point.kind:5} at {point.time_s:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")
-    if not plane.points:
+    if plane.without_position:
+        click.echo(f"left out: {plane.without_position} of {len(source.edges)} edges, at which the log has no position "
+                   "(x_m, y_m), and the passes that they begin or end")
+    if not source.edges:
         click.echo("no edges found" + (" in the down range" if truth else f" by {detector}"))
     for number, platform in enumerate(plane.platforms):
         if platform.outline is not None:

@@ -38,7 +38,8 @@ Figures, by the paper's labels:
 @click.option("--quick", is_flag=True, help="Fewer flights, one fold, short trainings.")
 @click.option("--workers", type=click.IntRange(1), help="Processes, each with up to 3 GB; one a core, four at most, if "
                                                         "left out.")
-@click.option("--force", is_flag=True, help="Make figures again that are there, and replace those of other settings.")
+@click.option("--force", is_flag=True, help="Make figures again that are there, with new trainings, and replace "
+                                           "those of other settings.")
 def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: Path | None, quick: bool,
             workers: int | None, force: bool) -> None:
     """Make every table and figure of the paper's evaluation again, with the paper's method and with `best`.
@@ -63,6 +64,8 @@ def command(only: tuple[str, ...], out: Path, flights: Path | None, power_log: P
     for path in (flights, power_log):
         if path is not None and not path.exists():
             raise AirTouchError(f"{path}: no such file or folder")
+    if power_log is not None and "table1" not in chosen:
+        raise click.UsageError("--power-log is for table1, which --only leaves out")
     job = Job(flights or find_flights(), out / "work", quick, power_log, partial(click.echo, err=True))
     records = run.run(chosen, out, job, force=force, command=typed(), workers=workers or min(available_cores(), 4))
     for name in chosen:

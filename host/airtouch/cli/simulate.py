@@ -77,13 +77,11 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     "platform", "none" or "firmware" in the file). The same command continues after a kill. Flights that diverge are
     reported with their number and never written; the exit code is then 1.
     """
-    from airtouch import __version__
     from airtouch import vehicle as vehicles
     from airtouch.crazyflie import mission
     from airtouch.logs.files import read_text
     from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
-    from airtouch.simulation.firmware import settings
     from airtouch.simulation.flight import choose, refuse_off
     from airtouch.simulation.stepper import Stepper
     from airtouch.simulation.workers import cluster, local, store
@@ -99,11 +97,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     refuse_off(plan, without)
     Stepper(plan, craft, seed, 0, choose(plan, pairs, without))  # a vehicle that cannot fly is refused here
     client = cluster.connect(dask) if dask else None
-    release = settings.load(plan.with_changes(craft).firmware)
-    request = {"airtouch": __version__, "firmware_digest": store.digest(repr(release.tolist())),
-               "scenario": scene.name, "scenario_digest": store.digest(repr(scene.table)),
-               "vehicle": vars(craft), "effects": pairs, "without": list(without), "seed": seed,
-               "effect_files": [store.digest(text) for text in plugins]}
+    request = store.request_of(scene, craft, pairs, without, seed, plugins)
     store.open_folder(out, request, force)
     todo = store.missing(out, scene.name, seed, flights)
     if len(todo) < flights:

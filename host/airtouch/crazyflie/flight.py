@@ -115,13 +115,15 @@ class Flight:
         """
         self._receive()
         silence = self._silence(wall)
-        if self._restarted_s is not None and not self._flies_on(wall):
+        if self._restarted_s is not None and not self._flies_on():
             self._repair_link(silence)
             self._ping(wall)
             return self._after_restart(wall)
         for kind, code in drain(self.craft.answers):
             self.pilot.answer(kind, code)
-        self._land_early(wall, silence)
+        self._land_early(silence)
+        if self.pilot.phase == "landing" and self._landing_since is None:  # also after a command that was refused
+            self._landing_since = wall
         self._repair_link(silence)
         self._send(self.pilot.step(self._now(silence), wall, silence))
         self._ping(wall)
@@ -129,7 +131,7 @@ class Flight:
             return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
         return None
 
-    def _flies_on(self, wall: float) -> bool:
+    def _flies_on(self) -> bool:
         """True if a drone whose clock started again says that it flies; it then lands.
 
         Only its own word counts: a landing that is sent to a drone that fell would spin its motors.
@@ -137,7 +139,7 @@ class Flight:
         if not self.pilot.in_air or self.intake.supervisor is None or not self.intake.supervisor & FLYING:
             return False
         self._restarted_s = None
-        self._land_for("the drone's clock jumped", wall)
+        self._land_for("the drone's clock jumped")
         return True
 
     def _after_restart(self, wall: float) -> str | None:
@@ -160,17 +162,16 @@ class Flight:
         if not self.pilot.in_air:
             self.in_air(False)
 
-    def _land_early(self, wall: float, silence: float) -> None:
+    def _land_early(self, silence: float) -> None:
         """Turn the mission into a landing where there is a reason to land."""
         reason = self._reason(silence)
         if reason:
-            self._land_for(reason, wall)
+            self._land_for(reason)
 
-    def _land_for(self, reason: str, wall: float) -> None:
+    def _land_for(self, reason: str) -> None:
         if self.pilot.phase == "mission":
             self._tell(f"{reason}: landing")
             self.pilot.land(reason)
-            self._landing_since = wall
 
     def _repair_link(self, silence: float) -> None:
         """Connect again to a lost drone; request the log blocks again that a silent one has deleted."""

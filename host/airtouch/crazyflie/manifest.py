@@ -12,6 +12,7 @@ from airtouch.logs.edges import true_edges
 from airtouch.logs.files import MANIFEST, read_text, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.segments import PLATFORM_STEP_M
+from airtouch.vehicle import arm_pwm_of
 
 COLUMNS = ("file", "use", "fold", "height", "angle_deg", "wind", "speed_mps")
 FOLDS = 5  #: folds of cross-validation, as in the authors' manifest
@@ -53,7 +54,7 @@ def use_of(log: FlightLog, planned: bool) -> str:
 
 def crossed_an_edge(log: FlightLog) -> bool:
     """True if the down range shows an edge, or if there is no down range."""
-    return not log.has("zrange_m") or bool(true_edges(log))
+    return not log.has("zrange_m") or bool(true_edges(log, arm_pwm=arm_pwm_of(log.meta)))
 
 
 def over_low_platforms_only(log: FlightLog) -> bool:
@@ -61,7 +62,7 @@ def over_low_platforms_only(log: FlightLog) -> bool:
 
     Scores have no true edges of such a flight, and over the platform it is not in free air.
     """
-    return not crossed_an_edge(log) and bool(true_edges(log, PLATFORM_STEP_M))
+    return not crossed_an_edge(log) and bool(true_edges(log, PLATFORM_STEP_M, arm_pwm_of(log.meta)))
 
 
 def recover(folder: Path) -> tuple[list[Path], list[str]]:

@@ -73,7 +73,8 @@ def settle(drone: Drone, ready: Readiness, least_v: float, stop: Event) -> Intak
     standing_still(drone, ready.slow)
     reset_estimator(drone)
     standing = listen(drone, ready.slow, FIRST_DATA_S)
-    now = replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor)
+    now = replace(ready.condition, vbat_v=standing.latest["vbat_V"], supervisor=standing.supervisor,
+                  zrange_m=standing.latest["zrange_m"])
     faults = checks.problems(now, least_v)
     if faults:
         raise AirTouchError(f"not ready: {faults[0]}")

@@ -80,9 +80,11 @@ def ablate(
 ) -> dict[str, dict[str, Any]]:
     """Summary of each ablation over the folds, by name, with `group`, `what`, `seconds` and per-fold `folds`.
 
-    Finished folds are kept in `out`. best_options, paper_options: options of every fit of that detector.
+    Finished folds are kept in `out`. best_options, paper_options: options of every fit of that detector. tell: called
+    with a line for each ablation and fold, and with the reason of each flight that is left out, once.
     """
     results = {}
+    reasons: set[str] = set()
     for number, name in enumerate(names, start=1):
         ablation = ABLATIONS[name]
         tell(f"{number}/{len(names)} {name}: {ablation.title}")
@@ -91,6 +93,10 @@ def ablate(
         result = crossval.crossval(
             f"variant-{name}" if ablation.variant else ablation.name, files, out,
             crossval.Settings(seed, {**(shared or {}), **ablation.options}), detector=ablation.variant, tell=tell)
+        for reason in dict(result.left_out).values():
+            if reason not in reasons:
+                tell(f"left out: {reason}")
+                reasons.add(reason)
         results[name] = {"group": ablation.group, "what": ablation.title, **summary.summarise(result.scores),
                          "by_height": summary.by_height(result.scores), "folds": [f.plain() for f in result.folds],
                          "seconds": sum(f.seconds for f in result.folds), "left_out": len(result.left_out)}

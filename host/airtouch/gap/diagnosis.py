@@ -19,7 +19,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import cannot_of
-from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import PERIOD_S, Flight, none_usable, notes_on, ready_alike
 from airtouch.gap.naming import gap_closure
 from airtouch.gap.naming.judging import HALVED_BY_FLIGHT, halves
 from airtouch.gap.naming.records import Selection
@@ -37,7 +37,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import effects
-from airtouch.vehicle import Vehicle
+from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 MOST_SECONDS = 210.0  #: of flight that candidates are fitted and judged on; chosen: more adds time, not certainty
 BLOCK_S = LENGTH[AIR] * PERIOD_S  #: length of a block in the air, the least that is judged
@@ -83,17 +83,16 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
     flights, an unknown effect, or where `before` has another vehicle, baseline or effects left out.
     """
-    say, without = progress or (lambda _: None), _names(without)
+    say, without = progress or (lambda _: None), effects.names_of(without)
     if partner and len(flights) != 1:
         raise AirTouchError("a partner's log belongs to one flight; diagnose that flight alone")
     seconds = overhead.seconds_overhead(flights[0], partner) if partner else ()
     notes: list[str] = []
-    nominal = with_gyro_if_any(list(ready_flights(baseline, vehicle, notes)), notes)
     of_flights: list[str] = []
-    usable = with_gyro_if_any(list(ready_flights(flights, vehicle, of_flights)), of_flights)
+    usable, nominal = ready_alike(flights, baseline, vehicle, of_flights, notes)
     if not usable:
         raise none_usable(of_flights, "no flight to diagnose")
-    notes += of_flights
+    notes += [*of_flights, *other_baseline((name_in(f.meta) for f in flights), (name_in(f.meta) for f in baseline))]
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
@@ -130,13 +129,6 @@ def _content(flight: Flight) -> str:
         digest.update(f"{name} {values.shape} ".encode())
         digest.update(np.ascontiguousarray(values).tobytes())
     return f"{flight.name} {digest.hexdigest()}"
-
-
-def _names(without: Iterable[str]) -> tuple[str, ...]:
-    """The effects to leave out. Raises AirTouchError for one name in place of several, and for an unknown one."""
-    if isinstance(without, str):
-        raise AirTouchError(f"without is a list of effects: [{without!r}]")
-    return tuple(effects.get(name).name for name in without)
 
 
 def diagnose_with_study(study: Study, flights: Sequence[Flight], without: Iterable[str] = (),
@@ -186,7 +178,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
         pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
-    return replace(answer, next=next_steps(answer, usable, comparison.vehicle))
+    return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 
 def _calibrated(vehicle: Vehicle, nominal: Sequence[Flight], without: Sequence[str],

@@ -11,7 +11,14 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
 from airtouch.gap.flights.fitness import cannot_of, notes_of
-from airtouch.gap.flights.flight import none_usable, ready, ready_flights, with_gyro_if_any
+from airtouch.gap.flights.flight import (
+    GYRO_UNUSED,
+    none_usable,
+    ready,
+    ready_flights,
+    with_gyro_if_any,
+    without_gyro,
+)
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.nominal.consistency import differences
@@ -23,8 +30,8 @@ from airtouch.gap.where.cell_words import in_words, short
 from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_power, mean_spectra
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
-from airtouch.logs.flight_log import FlightLog
-from airtouch.vehicle import Vehicle
+from airtouch.logs.flight_log import GYRO, FlightLog
+from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 
 @dataclass(frozen=True)
@@ -34,7 +41,8 @@ class Measurement:
     gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
     calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
     flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
-    flights were not used; study: what the map holds them against, whose floor the pictures show.
+    flights were not used; study: what the map holds them against, whose floor the pictures show; uses_gyro: whether a
+    gyro that the flights have is used, as it is where the baseline has one.
     """
 
     vehicle: str
@@ -50,6 +58,7 @@ class Measurement:
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     study: Study | None = field(default=None, compare=False, repr=False)
+    uses_gyro: bool = field(default=True, compare=False, repr=False)
 
     @property
     def headline(self) -> Cell | None:
@@ -68,7 +77,7 @@ class Measurement:
         return where, f"Overall it is {short(self.gap['before'])} times the floor{calibrated}"
 
     def plain(self) -> dict[str, Any]:
-        """JSON-ready: `where` as in the diagnosis, `map` with every cell."""
+        """JSON-ready, the keys of host/docs/gap-json.md: `where` as in the diagnosis with `words`, `map` all cells."""
         return rounded({
             "vehicle": self.vehicle, "flights": list(self.flights), "baseline": list(self.baseline),
             "where": [plain_cell(c) | {"words": in_words(c)} for c in self.where],
@@ -86,7 +95,7 @@ class MeasuredFlight:
     """One flight held against the model of each study.
 
     parts: of the map of each study; power: of its commands; speeds (2, 4): `rotor_speeds`, 1/min; notes, cannot: of the
-    `Flight`; has_gyro: whether it has one.
+    `Flight`; has_gyro: whether it has one; vehicle: that its log names.
     """
 
     parts: tuple[Part, ...]
@@ -95,6 +104,7 @@ class MeasuredFlight:
     notes: tuple[str, ...]
     cannot: tuple[str, ...]
     has_gyro: bool
+    vehicle: str
 
     @property
     def name(self) -> str:
@@ -124,14 +134,17 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
     else:
         studies = [declared_study(vehicle, nominal)]
     notes = list(dict.fromkeys([*differences(studies[0], nominal), *(fitted.notes if fitted else ())]))
-    measured = _measured(studies, flights, mapper, progress, left_out)
+    uses_gyro = not nominal or nominal[0].has_gyro
+    measured = _measured(partial(measured_flight, tuple(studies), uses_gyro=uses_gyro), flights, mapper, progress,
+                         left_out)
     maps = [assemble(study, [m.parts[i] for m in measured], [part_of(study, f) for f in nominal])
             for i, study in enumerate(studies)]
     gap = {"before": summary.overall(maps[0].cells), "floor": 1.0}
     if len(maps) > 1:
         gap["calibrated"] = summary.overall(maps[1].cells)
-    notes += [*notes_of([(m.name, m.notes) for m in measured]),
-              *notes_of([(f.name, f.notes) for f in nominal], "baseline flights")]
+    notes = [*notes_of([(m.name, m.notes) for m in measured]),
+             *notes_of([(f.name, f.notes) for f in nominal], "baseline flights"),
+             *other_baseline([m.vehicle for m in measured], [name_in(f.log.meta) for f in nominal]), *notes]
     first = summary.headline(maps[0].cells)
     return Measurement(
         vehicle=vehicle.name, map=maps[0], gap=gap,
@@ -140,17 +153,18 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         calibration=fitted.parameters if fitted else {},
         spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
         rotors=speeds_over_flights([m.speeds for m in measured]), notes=tuple(notes),
-        cannot=cannot_of([m.cannot for m in measured]), left_out=(*of_baseline, *left_out), study=studies[0])
+        cannot=cannot_of([m.cannot for m in measured]), left_out=(*of_baseline, *left_out), study=studies[0],
+        uses_gyro=uses_gyro)
 
 
-def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], mapper: Callable, progress: Callable[[str], None],
-              left_out: list[str]) -> list[MeasuredFlight]:
-    """Each flight that can be used against the model of each study, those with a gyro if any has.
+def _measured(measure_one: Callable[[FlightLog], MeasuredFlight | str], flights: Iterable[FlightLog], mapper: Callable,
+              progress: Callable[[str], None], left_out: list[str]) -> list[MeasuredFlight]:
+    """Each flight that can be used as `measure_one` measures it, those with a gyro if any has.
 
     The reasons of the others are added to `left_out`. Raises AirTouchError when no flight can be used.
     """
     measured: list[MeasuredFlight] = []
-    for one in mapper(partial(measured_flight, tuple(studies)), flights):
+    for one in mapper(measure_one, flights):
         if isinstance(one, str):
             left_out.append(one)
         else:
@@ -161,20 +175,24 @@ def _measured(studies: Sequence[Study], flights: Iterable[FlightLog], mapper: Ca
     return with_gyro_if_any(measured, left_out)
 
 
-def measured_flight(studies: Sequence[Study], log: FlightLog) -> MeasuredFlight | str:
-    """One flight against the model of each study, or the reason why it cannot be used."""
+def measured_flight(studies: Sequence[Study], log: FlightLog, uses_gyro: bool = True) -> MeasuredFlight | str:
+    """One flight against the model of each study, with its gyro or without it, or the reason why it cannot be used."""
+    unused = not uses_gyro and log.has(*GYRO)
     try:
-        flight = ready(log, studies[0].vehicle)
+        flight = ready(without_gyro(log) if unused else log, studies[0].vehicle)
     except AirTouchError as error:
         return str(error)
+    if unused:
+        flight = replace(flight, notes=(*flight.notes, GYRO_UNUSED))
     return MeasuredFlight(tuple(part_of(s, flight) for s in studies), command_power(flight, studies[0].vehicle),
-                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot, flight.has_gyro)
+                          rotor_speeds(flight, studies[0]), flight.notes, flight.cannot, flight.has_gyro,
+                          name_in(log.meta))
 
 
 def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
     """The curves of a measurement, of its first flights."""
-    flights = with_gyro_if_any(list(ready_flights(islice(logs, MOST_FLIGHTS), vehicle, [])), []) \
-        if measurement.where else []
+    first = (log if measurement.uses_gyro else without_gyro(log) for log in islice(logs, MOST_FLIGHTS))
+    flights = with_gyro_if_any(list(ready_flights(first, vehicle, [])), []) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
     curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where)

@@ -255,7 +255,7 @@ class Diagnosis:
         return f"Diagnosis({'; '.join(s for s in parts if s)})"
 
     def plain(self) -> dict[str, Any]:
-        """JSON-ready, the fields of host/docs/gap.md, "The JSON"; floats rounded to six digits."""
+        """JSON-ready, the keys of host/docs/gap-json.md; floats rounded to six digits."""
         content = {
             "verdict": self.verdict,
             "effects": [{"name": e.name, "parameters": {k: q.plain() for k, q in e.parameters.items()},

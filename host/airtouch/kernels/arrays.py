@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.kernels.library import ffi
+from airtouch.reference.shapes import repeated
 from airtouch.vehicle import Vehicle
 
 
@@ -33,11 +34,17 @@ def vehicle_struct(vehicle: Vehicle) -> Any:
     })
 
 
-def column(values: Any, n: int) -> np.ndarray:
-    """(n,) float32 from (n,), one value, or None for NaN throughout."""
-    return float32(np.broadcast_to(np.nan if values is None else values, (n,)))
+def column(values: Any, n: int, name: str) -> np.ndarray:
+    """(n,) float32 from (n,), one value, or None for NaN throughout.
+
+    Raises AirTouchError for another shape; name: of the signal, for the error.
+    """
+    return float32(repeated(np.nan if values is None else values, (n,), name))
 
 
 def axes(thrust_axis: Any, n: int) -> np.ndarray:
-    """(n, 3) float32 from (n, 3), (3,), or None for NaN throughout: the kernels then take (0, 0, 1)."""
-    return float32(np.broadcast_to(np.nan if thrust_axis is None else thrust_axis, (n, 3)))
+    """(n, 3) float32 from (n, 3), (3,), or None for NaN throughout: the kernels then take (0, 0, 1).
+
+    Raises AirTouchError for another shape.
+    """
+    return float32(repeated(np.nan if thrust_axis is None else thrust_axis, (n, 3), "thrust axis"))

@@ -27,8 +27,11 @@ class BandPowerBank:
                                 f"not {window} and {hop}")
 
     def push(self, x: np.ndarray) -> np.ndarray:
-        """Powers, one row an output, float32, of the next samples (n, channels)."""
-        return self._run(float32(x), reset=False)[0]
+        """Powers, one row an output, float32, of the next samples (n, channels). Raises AirTouchError for others."""
+        samples = float32(x)
+        if samples.ndim != 2 or samples.shape[1] != self.channels:
+            raise AirTouchError(f"band power: samples must be (n, {self.channels}), not {samples.shape}")
+        return self._run(samples, reset=False)[0]
 
     def _run(self, x: np.ndarray, reset: bool) -> tuple[np.ndarray, bool]:
         """Powers, and whether the kernel takes these settings."""

@@ -22,7 +22,7 @@ def disturbance_force(
     if acc.shape != (n, 3) or motors.shape != (n, 4):
         raise AirTouchError(f"disturbance force: needs (n, 3) accelerations and (n, 4) PWM, "
                             f"not {acc.shape} and {motors.shape}")
-    volts, axis, out = column(vbat_v, n), axes(thrust_axis, n), np.empty((n, 3), dtype=np.float32)
+    volts, axis, out = column(vbat_v, n, "battery voltage"), axes(thrust_axis, n), np.empty((n, 3), dtype=np.float32)
     lib.disturbanceForceBatch(pointer(acc), pointer(motors), pointer(volts), pointer(axis), n,
                               vehicle_struct(vehicle), pointer(out))
     return out
@@ -34,7 +34,7 @@ def total_thrust(pwm: np.ndarray, vehicle: Vehicle, vbat_v: np.ndarray | float |
     n = len(motors)
     if motors.shape != (n, 4):
         raise AirTouchError(f"thrust: needs (n, 4) PWM, not {motors.shape}")
-    volts, out = column(vbat_v, n), np.empty(n, dtype=np.float32)
+    volts, out = column(vbat_v, n, "battery voltage"), np.empty(n, dtype=np.float32)
     lib.totalThrustBatch(pointer(motors), pointer(volts), n, vehicle_struct(vehicle), pointer(out))
     return out
 

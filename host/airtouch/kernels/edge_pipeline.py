@@ -44,7 +44,8 @@ def edge_pipeline(
     acc, rate, motors = check_signals(acc_world, gyro, pwm)
     n = len(acc)
     samples = float32(np.column_stack([
-        acc, rate, motors, column(vbat_v, n), axes(thrust_axis, n), column(probability, n)
+        acc, rate, motors, column(vbat_v, n, "battery voltage"), axes(thrust_axis, n),
+        column(probability, n, "probability")
     ]))
     events = np.zeros(n, dtype=_event_dtype())
     state = ffi.new("double[]", pipeline_ram_bytes() // 8 + 1)  # doubles, for their alignment

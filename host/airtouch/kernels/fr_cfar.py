@@ -34,7 +34,8 @@ def fr_cfar(
 def threshold_factor(leading_window: int, p_fa: float) -> float:
     """alpha = N (P_FA^(-1/N) - 1) as the kernel has it."""
     check_settings(0, leading_window, p_fa)
-    factor = lib.frCfarFactor(leading_window, 0, p_fa, pointer(np.empty(leading_window, np.float32)))
+    ring = np.empty(leading_window, np.float32)
+    factor = lib.frCfarFactor(leading_window, 0, p_fa, pointer(ring))
     if not np.isfinite(factor):
         raise AirTouchError(_TOO_LARGE)
     return factor

@@ -51,6 +51,8 @@ def run_rolling(network: Int8Network, quantised: np.ndarray, stride: int = 1,
     size = rolling_size(network, stride)
     flat, keep = flat_layers(network.layers)
     good = np.ones(len(x), np.uint8) if usable is None else np.ascontiguousarray(usable, dtype=np.uint8)
+    if good.shape != (len(x),):
+        raise AirTouchError(f"network: usable must be ({len(x)},) as the samples, not {good.shape}")
     outputs, valid = np.zeros((len(x), network.outputs), np.int8), np.zeros(len(x), np.uint8)
     lib.rollingInt8Flight(flat, pointer(x), pointer(good), len(x), stride, ffi.new("int8_t[]", size.arena_bytes),
                           pointer(outputs), pointer(valid))

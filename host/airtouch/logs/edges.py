@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from airtouch.logs.alignment import oldest_range_s
 from airtouch.logs.checks.clock import regular_time, sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne
@@ -13,8 +14,6 @@ STEP_M = 0.30  #: m, least change of the down range within two samples at an edg
 ROUNDING_M = 1e-6  #: m, added to STEP_M, so that a step of exactly 0.30 m is no edge in floating point
 SETTLING_S = 0.10  #: s; the 24 to 40 Hz sensor may need two or three readings to settle after a step
 LEVEL_S = 0.10  #: s before and after an edge over which the heights are averaged
-LONGEST_GAP_S = 0.15  #: s without a valid reading or a row, after which a step is no edge; chosen, 3 readings at 24 Hz
-LONGEST_GAP_PERIODS = 1.5  #: sample periods that are no gap: one of a slow log exceeds 0.15 s
 IN_FLIGHT_S = 0.25  #: s before and after an edge in which the drone must fly
 
 
@@ -70,7 +69,7 @@ def _after_gap(log: FlightLog, period: float) -> np.ndarray:
     """True for the first two samples after a gap in the down range, by invalid readings or lost rows, (n,) bool."""
     time_s, _ = regular_time(log)
     valid = np.flatnonzero(np.isfinite(log["zrange_m"]) & np.isfinite(time_s))
-    gap = np.diff(time_s[valid]) > max(LONGEST_GAP_S, LONGEST_GAP_PERIODS * period)
+    gap = np.diff(time_s[valid]) > oldest_range_s(period)
     after = np.zeros(len(log) + 1, dtype=bool)
     after[valid[1:][gap]] = after[valid[1:][gap] + 1] = True
     return after[:-1]

@@ -56,9 +56,12 @@ def load_bytes(path: str | Path) -> bytes:
     return unzip(_bytes(path), str(path), [])
 
 
-def load_text(path: str | Path) -> bytes:
-    """A text file's bytes, unpacked if it is gzipped, with LF line ends. Raises AirTouchError as `read` does."""
-    return _text(load_bytes(path), str(path))
+def load_text(path: str | Path, warnings: list[str]) -> bytes:
+    """A text file's bytes, unpacked if it is gzipped, with LF line ends. Raises AirTouchError as `read` does.
+
+    warnings: gets one if the gzip file is cut off.
+    """
+    return _text(unzip(_bytes(path), str(path), warnings), str(path))
 
 
 def read_text(path: str | Path) -> str:

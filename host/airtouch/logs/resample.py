@@ -3,7 +3,7 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.alignment import hold, hold_of
+from airtouch.logs.alignment import hold, hold_of, hold_range, oldest_range_s
 from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
@@ -21,8 +21,9 @@ def resample(log: FlightLog, rate_hz: float = 100.0) -> FlightLog:
 
     To a lower rate a zero-phase Butterworth low-pass (8th order, forward and backward, corner at
     0.4 of the new rate) prevents aliasing. Values are interpolated linearly. Gaps longer than
-    both 0.1 s and 1.5 sample periods become NaN. Ranges hold their last value for 0.25 s and the
-    battery for 5 s (`alignment.hold_of`), or 1.5 sample periods where those are longer.
+    both 0.1 s and 1.5 sample periods become NaN. The down range holds its last value in gaps of at
+    most 0.15 s (`alignment.hold_range`), so that no gap in it becomes a true edge; other ranges for
+    0.25 s and the battery for 5 s (`alignment.hold_of`), or 1.5 sample periods where those are longer.
     meta["resampled"] describes this.
     Samples without a time, or out of order, are left out; a warning counts them.
     Raises AirTouchError for a rate outside 0.2 to 10000 Hz, a clock that stands still, and a
@@ -76,7 +77,9 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
     new: dict[str, np.ndarray] = {}
     for name, values in columns.items():
         valid = np.isfinite(values)
-        if name in HELD and valid.any():
+        if name == "zrange_m" and valid.any():
+            new[name] = hold_range(time_s[valid], values[valid], new_time, oldest_range_s(period))
+        elif name in HELD and valid.any():
             longest_s = max(hold_of(name), LONGEST_BRIDGE_PERIODS * period)
             new[name] = hold(time_s[valid], values[valid], new_time, longest_s)
         else:

@@ -23,7 +23,7 @@ from airtouch.logs.flight_log import (
     VELOCITY,
 )
 from airtouch.logs.quaternion import decompress, euler, rotation, to_body
-from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
+from airtouch.logs.units import GRAVITY, GYRO_LSB, down_range_m, side_range_m
 
 #: metadata on the vehicle of a log that does not say which flew: `assumed_vehicle` makes `vehicle.of_log` warn
 ASSUMED = {"vehicle": "crazyflie-2.1", "assumed_vehicle": "crazyflie-2.1"}
@@ -43,6 +43,13 @@ _GROUPS = (
     (tuple(f"stateEstimate.v{a}" for a in AXES), VELOCITY, 1.0),
     (tuple(f"stateEstimateZ.v{a}" for a in AXES), VELOCITY, 1e-3),
 )
+#: groups of variables that give nothing without all of them: motors, and what is turned into other axes
+_WHOLE = (
+    *(variables for variables, columns, _ in _GROUPS if columns in (PWM, RPM)),
+    *(tuple(f"{group}.a{a}" for a in AXES) for group in ("stateEstimate", "stateEstimateZ")),
+    tuple(f"stateEstimate.q{a}" for a in ("x", "y", "z", "w")),
+    tuple(f"stateEstimateZ.rate{a}" for a in ("Roll", "Pitch", "Yaw")),
+)
 _SINGLE = (
     ("pm.vbat", "vbat_V", 1.0),
     ("pm.vbatMV", "vbat_V", 1e-3),
@@ -55,8 +62,9 @@ _SINGLE = (
 def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[str, np.ndarray]:
     """The schema's columns of a table {log variable: (n,) float64}, in SI units.
 
-    Sets meta["acc_frame"] if there is an acceleration. Variables without a column in the
-    schema are left out.
+    Sets meta["acc_frame"] if there is an acceleration. Variables without a column in the schema
+    are left out. Of a group that is not logged whole each axis has its column, unless it needs the
+    others; a warning names those that are left out.
     """
     columns: dict[str, np.ndarray] = {}
     for variables, names, factor in _GROUPS:
@@ -66,14 +74,15 @@ def to_columns(table: Mapping[str, np.ndarray], meta: dict[str, Any]) -> dict[st
         if variable in table and name not in columns:
             columns[name] = table[variable] * factor
     if "range.zrange" in table:
-        columns["zrange_m"] = range_m(table["range.zrange"])
+        columns["zrange_m"] = down_range_m(table["range.zrange"])
     for name in RANGES:
         variable = f"range.{name.split('_')[1]}"
         if variable in table:
-            columns[name] = range_m(table[variable], zero_is_invalid=True)
+            columns[name] = side_range_m(table[variable])
     _attitude(table, columns)
     _rates(table, columns, meta)
     _acceleration(table, columns, meta)
+    _parts(table, columns, meta)
     return columns
 
 
@@ -129,3 +138,17 @@ def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray
         meta["acc_frame"] = "world"
         meta["warnings"].append("attitude not fully logged: acc_* are in the world frame, not in the body's")
         columns |= dict(zip(ACC, world.T, strict=True))
+
+
+def _parts(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
+    """Add the logged axes of groups that have no column yet. A warning names variables that need others of theirs."""
+    for variables, names, factor in _GROUPS:
+        if variables not in _WHOLE and not any(name in columns for name in names):
+            logged = {name: table[v] * factor for v, name in zip(variables, names, strict=True) if v in table}
+            columns |= logged
+            if logged and names == ACC:
+                meta["acc_frame"] = "body"
+    for group in _WHOLE:
+        logged_ones, missing = [v for v in group if v in table], [v for v in group if v not in table]
+        if logged_ones and missing:
+            meta["warnings"].append(f"{', '.join(logged_ones)} left out, as {', '.join(missing)} are not logged")

@@ -54,16 +54,21 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     """Write figures as NAME.png, .svg, .csv and .json to `out`, and index.html of all figures there.
 
     Returns the records: name -> record. A figure with the same settings is not made again. A figure with missing or bad
-    input has the reason in its record ("missing"), and the others are made. workers: processes; `job.tell` must then be
-    a function that can be pickled. Raises AirTouchError, before any work, if `out` holds a figure with other settings,
-    without `force`; and if a process dies. command: as it was typed, for the records of the figures that are made.
+    input has the reason in its record ("missing"), and the others are made. force: make the chosen figures anew, with
+    an emptied work folder. workers: processes; `job.tell` must then be a function that can be pickled. Raises
+    AirTouchError, before any work, if `out` holds a figure with other settings, without `force`, where it is not a
+    figure of a quick run that a whole run replaces; and if a process dies. command: as it was typed, for the records of
+    the figures that are made.
     """
     old = {name: record(out, name) for name in chosen}
     same = {name for name, entry in old.items() if entry and entry["key"] == settings_key(job, name)}
-    stale = [name for name, entry in old.items() if entry and name not in same and "missing" not in entry]
+    stale = [name for name, entry in old.items() if entry and name not in same and "missing" not in entry
+             and not (entry.get("quick") and not job.quick)]
     if stale and not force:
         raise AirTouchError(f"{out / stale[0]}.csv was made with other settings; use --force, or another --out")
     make_folder(out)
+    if force:
+        empty(job.work)
     done = [name for name, entry in old.items()
             if entry and name in same and "missing" not in entry and not force]
     for name in done:
@@ -79,6 +84,13 @@ def run(chosen: Sequence[str], out: Path, job: Job, *, force: bool = False, comm
     all_records = records(out)
     page.write(out, all_records)
     return all_records
+
+
+def empty(work: Path) -> None:
+    """Delete the trainings, scores and crossings of the camera that earlier runs stored in their work folder."""
+    for pattern in ("folds/*.json", "folds/*.npz", "vision_*.json"):
+        for path in work.glob(pattern):
+            path.unlink()
 
 
 def make_all(chosen: Sequence[str], job: Job, out: Path, command: str) -> None:

@@ -1,14 +1,21 @@
 """Values with intervals as text, and the rules by which a claim counts as reproduced."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
 
+import numpy as np
+
+from airtouch.detector.evaluation import summary
+from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures.claims import NOT_REPRODUCED, REPRODUCED, UNDECIDED
 from airtouch.paper_figures.figure import Verdict
+
+Gain: TypeAlias = tuple[float | None, tuple[float, float] | None]  #: a fraction and its 95 % interval; None: unknown
 
 MOST_MISSED = 0.10  #: fraction of missed edges above which the mean error of the others is not compared
 #: Margins within which the 95 % interval of a difference must lie for "the same" or "reached". No source: chosen.
 ERROR_MARGIN = 0.25  #: of a mean error or a power, as a fraction of it
+COUNT_MARGIN = 0.10  #: of a count without an interval (bytes, operations), as a fraction of the paper's
 SHARE_MARGIN = 0.10  #: of a share: of edges missed, of edges within a distance
 
 
@@ -67,6 +74,30 @@ def worse(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool | None:
         a, b = first["intervals"][key], second["intervals"][key]
         answers.append(None if a is None or b is None else decided(b[0] > a[1], b[1] - a[0] <= margin))
     return any_of(answers)
+
+
+def gain(rows: Mapping[str, Any], scores: Mapping[str, Sequence[FlightScore]], name: str, other: str) -> Gain:
+    """How much less the error of `name` is than that of `other`, as a fraction, with its 95 % interval by flight.
+
+    rows, scores: summary and scores of the same flights, by name. (None, None) where either detects no edge.
+    """
+    ours, theirs = (rows[n]["mean_abs_error_m"] for n in (name, other))
+    if ours is None or not theirs:
+        return None, None
+    interval = summary.paired(scores[name], scores[other], lambda first, second: {
+        "gain": 1.0 - first["mean_abs_error_m"] / second["mean_abs_error_m"]})
+    return 1.0 - ours / theirs, interval["gain"]
+
+
+def gained(reduction: Gain, least: float, below: float) -> bool | None:
+    """Whether a `gain` is enough: yes if its interval begins at `least` or above, no if it ends under `below`."""
+    low, high = reduction[1] or (np.nan, np.nan)
+    return decided(low >= least, high < below)
+
+
+def near(value: float, published: float) -> bool:
+    """Whether a count lies within COUNT_MARGIN of the paper's."""
+    return abs(value - published) <= COUNT_MARGIN * published
 
 
 def decided(yes: bool, no: bool) -> bool | None:

@@ -59,6 +59,7 @@ def band_power(
     first, last = band_bins(sample_rate_hz, window, band_hz)
     if int(hop) != hop or hop < 1:
         raise AirTouchError(f"band power: the hop must be at least 1 sample, not {hop}")
+    hop = int(hop)
     samples = np.asarray(x, dtype=np.float64)
     if samples.ndim not in (1, 2):
         raise AirTouchError(f"band power: samples must be (n,) or (n, channels), not {samples.shape}")

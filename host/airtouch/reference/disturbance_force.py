@@ -4,6 +4,7 @@ import numpy as np
 
 from airtouch.errors import AirTouchError
 from airtouch.reference.finite import ACC_CLAMP, AXIS_LIMIT, PWM_MAX, hold_finite
+from airtouch.reference.shapes import repeated
 from airtouch.vehicle import Vehicle
 
 VOLTAGE_RANGE = np.float32(0.1), np.float32(1000.0)  #: what can be a battery's voltage, V
@@ -36,7 +37,7 @@ def disturbance_force(
     thrust = total_thrust(pwm, vehicle, vbat_v)
     axis = np.array([0.0, 0.0, 1.0])
     if thrust_axis is not None:
-        axis = hold_finite(np.broadcast_to(thrust_axis, (n, 3)), initial=axis, limit=AXIS_LIMIT)[0]
+        axis = hold_finite(repeated(thrust_axis, (n, 3), "thrust axis"), initial=axis, limit=AXIS_LIMIT)[0]
     return vehicle.mass_kg * acc - thrust[:, None] * axis
 
 
@@ -53,7 +54,7 @@ def voltage_factor(n: int, vehicle: Vehicle, vbat_v: np.ndarray | float | None) 
     """(vbat / nominal)^2, (n,), 0.25 to 4; 1 where either is unknown, the last known (0.1 to 1000 V) voltage held."""
     if vbat_v is None or vehicle.nominal_voltage_v is None:
         return np.ones(n)
-    volts = np.broadcast_to(np.asarray(vbat_v, dtype=np.float64), (n,))
+    volts = repeated(vbat_v, (n,), "battery voltage")
     known = np.where((volts >= VOLTAGE_RANGE[0]) & (volts <= VOLTAGE_RANGE[1]), volts, np.nan)
     volts = hold_finite(known, initial=vehicle.nominal_voltage_v)[0]
     return np.clip(np.square(volts / vehicle.nominal_voltage_v), *FACTOR_RANGE)

@@ -59,7 +59,9 @@ def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig
     """Edges (n,), 0 none, 1 entry, 2 exit, of logits (n, 3 or more): over, entry, exit; airborne (n,) bool.
 
     NaN logits count as "no". On the ground the state is off the platform, and forgotten.
+    Raises AirTouchError when the shapes disagree.
     """
+    check_shapes(np.shape(logits), np.shape(airborne))
     limited = np.clip(np.where(np.isnan(logits), -LOGIT_LIMIT, logits), -LOGIT_LIMIT, LOGIT_LIMIT)
     edges = np.zeros(len(limited), dtype=np.uint8)
     state = _State()
@@ -85,6 +87,13 @@ def edge_decoder(logits: np.ndarray, airborne: np.ndarray, config: DecoderConfig
         if not edges[t] and state.waiting and state.due == 0:
             edges[t], state.waiting = state.waiting, 0
     return edges
+
+
+def check_shapes(logits: tuple[int, ...], airborne: tuple[int, ...]) -> None:
+    """Raises AirTouchError unless logits are (n, 3 or more) and airborne is (n,)."""
+    if len(logits) != 2 or logits[1] < len(LOGITS) or airborne != logits[:1]:
+        raise AirTouchError(f"edge decoder: needs logits (n, {len(LOGITS)}) and airborne (n,), "
+                            f"not {logits}, {airborne}")
 
 
 def _wait(state: _State, logit: float, config: DecoderConfig) -> None:

@@ -13,6 +13,7 @@ from airtouch.reference.disturbance_force import disturbance_force, force_norm
 from airtouch.reference.feature_window import deviation_from_mean
 from airtouch.reference.finite import ACC_CLAMP, FLOAT32_MAX, PWM_MAX, RATE_CLAMP, hold_finite
 from airtouch.reference.fr_cfar import fr_cfar
+from airtouch.reference.shapes import repeated
 from airtouch.vehicle import Vehicle
 
 NONE, ENTRY, EXIT = 0, 1, 2  #: values of EdgeEvents.edge
@@ -94,7 +95,7 @@ def edge_pipeline(
     threshold, alert = fr_cfar(power, guard_cells=p.guard_cells, leading_window=p.leading_window, p_fa=p.p_fa)
     alert_recent = _since(alert) < p.alert_hold
     armed = _airborne_for(motors, p) >= p.arm_samples
-    crossing = decode(np.full(n, np.nan) if probability is None else probability, armed, p)
+    crossing = decode(repeated(np.nan if probability is None else probability, (n,), "probability"), armed, p)
     dropped = (crossing != NONE) & ~alert_recent & config.physical_filter
     return EdgeEvents(
         ready=ready, band_power=powers, features=cascaded_cross_spectrum(powers),

@@ -52,6 +52,6 @@ class FloorHeight:
 
     def flow(self, height: float) -> float:
         """Factor on the part of an optical flow that comes from moving."""
-        if self.floor == 0.0 or height <= FLOW_NEAREST_M:
+        if self.floor == 0.0 or not height > FLOW_NEAREST_M:  # NaN too
             return 1.0
         return max(height - self.floor, FLOW_NEAREST_M) / height

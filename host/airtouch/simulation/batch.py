@@ -44,8 +44,7 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     seed = _whole(seed, "seed")
     workers = available_cores() if workers is None else _whole(workers, "workers", 1)
     effects = registry.activate(effects)
-    for name in without:
-        registry.get(name)
+    without = registry.names_of(without)
 
     def one(number: int) -> FlightLog | Diverged:
         return fly(scene, craft, seed, number, effects=effects, without=without)

@@ -19,7 +19,7 @@ from airtouch.simulation.sensors.radio import received, rounded
 from airtouch.simulation.stepper import Stepper, prepare
 from airtouch.vehicle import Vehicle
 
-__all__ = ["Chosen", "Diverged", "choose", "fly", "fly_plan", "prepare"]
+__all__ = ["Chosen", "Diverged", "choose", "fly", "fly_plan", "metadata", "prepare"]
 PER_UNIT = 1e6  #: logged values are whole millionths of their SI units
 Chosen = Mapping[str, Mapping[str, float]] | Sequence[Any]
 
@@ -70,6 +70,18 @@ def refuse_off(plan: FlightPlan, without: Sequence[str]) -> None:
                                 + (f"; on are {', '.join(dict.fromkeys(on))}" if on else ", nor any other effect"))
 
 
+def metadata(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
+             name: str) -> dict[str, Any]:
+    """What the log of a drawn flight says of it, but its `source`: vehicle and firmware, drawn values, effects."""
+    vehicle = plan.with_changes(vehicle)
+    return {
+        "format": "simulated", "sample_period_s": 0.01, "acc_frame": "body",
+        "vehicle": vehicle.name, "firmware": vehicle.firmware, "range_module": vehicle.range_module,
+        "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,
+        "effects": [[a.effect.name, dict(a.values)] for a in active], "warnings": [],
+    }
+
+
 def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active: Sequence[Active],
              name: str) -> FlightLog | Diverged:
     """Fly a drawn flight with these effects."""
@@ -88,11 +100,5 @@ def fly_plan(plan: FlightPlan, vehicle: Vehicle, seed: int, flight: int, active:
     rng = np.random.default_rng([seed, flight, 7])
     table = received(table, *radio, rng)
     rounded(table, PER_UNIT)
-    meta = {
-        "source": f"{name}_{seed}_{flight:06d}", "format": "simulated", "sample_period_s": 0.01,
-        "acc_frame": "body",
-        "vehicle": vehicle.name, "firmware": vehicle.firmware, "range_module": vehicle.range_module,
-        "scenario": name, "seed": seed, "flight": flight, "condition": plan.values,
-        "effects": [[a.effect.name, dict(a.values)] for a in active], "warnings": [],
-    }
+    meta = {"source": f"{name}_{seed}_{flight:06d}", **metadata(plan, vehicle, seed, flight, active, name)}
     return FlightLog({c: table[:, i] for i, c in enumerate(COLUMNS)}, meta)

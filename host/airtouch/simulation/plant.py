@@ -112,11 +112,12 @@ def from_vehicle(vehicle: Vehicle) -> np.ndarray:
     Its fields may be changed in place; lengths and units are in FIELDS.
     """
     # as bytes: NumPy copies a record field by field, forty times as slow
-    return np.frombuffer(bytearray(_nominal(vehicle).tobytes()), DTYPE)
+    return np.frombuffer(bytearray(_nominal(vehicle, settings.load(vehicle.firmware).tobytes()).tobytes()), DTYPE)
 
 
 @functools.lru_cache(64)
-def _nominal(vehicle: Vehicle) -> np.ndarray:
+def _nominal(vehicle: Vehicle, release: bytes) -> np.ndarray:
+    """The plant of a vehicle that flies a release, the bytes of its settings: a file may have changed meanwhile."""
     plant = np.zeros(1, DTYPE)
     for name, _, default, _ in FIELDS:
         plant[name] = default
@@ -144,17 +145,16 @@ def _nominal(vehicle: Vehicle) -> np.ndarray:
     row["range_noise"], row["range_drift"] = vehicle.range_noise_rms_m, vehicle.range_drift_rms
     row["range_drift_time"] = vehicle.range_drift_time_s
     row["acc_lowpass"] = vehicle.acc_lowpass_hz
-    _firmware(row, vehicle)
+    _firmware(row, vehicle, np.frombuffer(release, settings.DTYPE)[0])
     return plant
 
 
-def _firmware(row: np.ndarray, vehicle: Vehicle) -> None:
-    """The settings of the vehicle's firmware, and what scales its loops to the vehicle.
+def _firmware(row: np.ndarray, vehicle: Vehicle, release: np.void) -> None:
+    """The settings of a firmware release, and what scales its loops to the vehicle.
 
     On a Crazyflie 2 (platform cf2) they fly as they are. Other vehicles get gains of the same loops without battery
     compensation; their thrust curve stands for the compensation of other platforms of the firmware.
     """
-    release = settings.load(vehicle.firmware)[0]
     row["firmware"] = release
     firmware, hover = row["firmware"], hover_pwm(vehicle)
     if vehicle.range_module != settings.OWN_MODULE:

@@ -1,6 +1,7 @@
 """Recorded motor commands through the same motors, rigid body and effects as in flight.
 
-Left out are the plant's motor_slowness and motor_dead_zone, which only effects of a user's own set, and motor noise.
+Left out are the plant's motor_slowness and motor_dead_zone, which only effects of a user's own set, motor noise, and
+the accelerometer's distance from the centre of mass: the specific force is that of the centre of mass.
 
 Nothing is integrated but what the motors and the effects remember: attitude, velocity
 and height come from the log where it has them. The diagnosis compares the result with
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import float64, njit, types
 
+from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
 from airtouch.simulation import signals as at
 from airtouch.simulation.body import battery, motors, rigid_body
@@ -171,12 +173,17 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     signals: (n, COUNT) where more is known than `signals_of` finds in the log; its rotor speeds and thrusts are
     overwritten, so hand in a copy. pwm: (n, 4) instead of the log's own. A command that is not finite holds the one
     before, at the start the first that is. A logged battery voltage is used where the vehicle declares the voltage of
-    its thrust curve. Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands.
+    its thrust curve. Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands,
+    and for an actuator delay longer than the delay line.
     """
     log.require(*PWM)
     plant, acting = prepare(vehicle, active)
     s = np.ascontiguousarray(signals_of(log, vehicle, active, period_s) if signals is None else signals)
     n = len(s)
+    longest_s = (motors.DELAY_ROWS - 1) * s[:, at.STEP].min(initial=np.inf)
+    if plant[0]["actuator_delay"] > longest_s:
+        raise AirTouchError(f"actuator_delay = {plant[0]['actuator_delay']:g} s is longer than a replay at this rate "
+                            f"can hold; give at most {longest_s:g} s")
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = log["vbat_V"].copy()

@@ -61,6 +61,8 @@ def names() -> list[str]:
 
 def load(name_or_path: str | Path) -> Scenario:
     """A built-in scenario by name, or a TOML file by path. Raises AirTouchError in one line."""
+    if not isinstance(name_or_path, (str, Path)):
+        raise AirTouchError(f"a scenario is a name, a .toml file or an object, not {name_or_path!r}")
     path = Path(name_or_path)
     if path.suffix == ".toml":
         if not path.is_file():

@@ -134,7 +134,7 @@ class Commander:
         if self.levelled:
             row[c.MODE], row[c.VX], row[c.VY] = c.TILT, 0.0, 0.0
             if kind == MANUAL:
-                row[c.MODE], row[c.Z] = c.TILT_THRUST, e
+                row[c.MODE], row[c.Z], row[c.MOTORS] = c.TILT_THRUST, e, float(e > 0.0)
         elif kind == POSITION:
             row[c.MODE], row[c.X], row[c.Y] = c.HOLD, a, b
         elif kind in (VELOCITY, HOVER):

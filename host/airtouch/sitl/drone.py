@@ -14,7 +14,7 @@ from airtouch.simulation.sensors import log_row
 from airtouch.simulation.stepper import Stepper
 from airtouch.sitl.app import App
 from airtouch.sitl.commander import PERIOD_S, Commander
-from airtouch.sitl.planner import DISABLED, FLYING, LANDING
+from airtouch.sitl.planner import FLYING, LANDING
 from airtouch.vehicle import Vehicle
 
 TICK_MS = 10
@@ -92,11 +92,11 @@ class Drone:
                 cr * cp * cy + sr * sp * sy)
 
     def info(self) -> int:
-        """The value of supervisor.info."""
+        """The value of supervisor.info. Its bit 10, high-level commander disabled, is never set."""
         planner, ready = self.commander.planner, self.state == PRE_FLIGHT and not self.emergency
         bits = [ready, ready, True, ready, self.is_flying and ready, self.state == CRASHED,
                 self.state == LOCKED, self.state == CRASHED, planner.state in (FLYING, LANDING),
-                planner.finished(self.now_s), planner.state == DISABLED]
+                planner.finished(self.now_s)]
         return sum(bool(bit) << i for i, bit in enumerate(bits))
 
     def stop(self) -> None:

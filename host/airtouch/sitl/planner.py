@@ -17,7 +17,7 @@ TAKEOFF_2, LAND_2, TAKEOFF_V, LAND_V, SPIRAL, GO_TO_2 = 7, 8, 9, 10, 11, 12
 FORMATS = {SET_GROUP: "<B", TAKEOFF: "<Bff", LAND: "<Bff", STOP: "<B", GO_TO: "<BBfffff",
            TAKEOFF_2: "<Bff?f", LAND_2: "<Bff?f", TAKEOFF_V: "<Bf?f?f", LAND_V: "<Bf?f?f",
            SPIRAL: "<BBBfffff", GO_TO_2: "<BBBfffff"}
-IDLE, FLYING, LANDING, DISABLED = "idle", "flying", "landing", "disabled"
+IDLE, FLYING, LANDING = "idle", "flying", "landing"
 LEAST_DURATION_S = 0.05  #: s; a shorter time is taken as this one
 #: value and derivatives of s^4 .. s^7 at s = 1, inverted
 _ENDS = np.linalg.inv([[1.0, 1.0, 1.0, 1.0], [4.0, 5.0, 6.0, 7.0], [12.0, 20.0, 30.0, 42.0],
@@ -54,7 +54,7 @@ def turn(yaw: float, to: float) -> float:
 
 
 class Planner:
-    """The planner. `goal(t)` is the set-point at t; None while it is idle or disabled."""
+    """The planner. `goal(t)` is the set-point at t; None while it is idle."""
 
     def __init__(self) -> None:
         self.state, self.group = IDLE, 0
@@ -70,16 +70,12 @@ class Planner:
         """Stop the motors, if the high-level commander has control."""
         self.state = IDLE
 
-    def disable(self) -> None:
-        """Return no set-points until the next command."""
-        self.state = DISABLED
-
     def finished(self, t: float) -> bool:
         """True if the last trajectory has ended at time t."""
         return t >= self._begun + self._seconds
 
     def goal(self, t: float) -> Goal | None:
-        """The set-point at t; None while idle or disabled. At the end of a landing the planner becomes idle."""
+        """The set-point at t; None while idle. At the end of a landing the planner becomes idle."""
         if self.state not in (FLYING, LANDING):
             return None
         if self.state == LANDING and self.finished(t):

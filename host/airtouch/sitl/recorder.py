@@ -1,6 +1,8 @@
 """Recording of a session's rows as one flight log."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +15,12 @@ DECIMALS = 6
 class Recorder:
     """The recording: `add` each row (33,), `write` at the end. Raises AirTouchError if it cannot be written."""
 
-    def __init__(self, path: Path, scenario: str, vehicle: str, seed: int, flight: int, force: bool) -> None:
+    def __init__(self, path: Path, meta: Mapping[str, Any], force: bool) -> None:
+        """meta: the log's metadata without its `source`."""
         files.check_free(path, force)
         self._path, self._force = path, force
         self._rows: list[np.ndarray] = []
-        self._meta = {"format": "simulated", "sample_period_s": 0.01, "acc_frame": "body", "vehicle": vehicle,
-                      "scenario": scenario, "seed": seed, "flight": flight, "warnings": []}
+        self._meta = dict(meta)
 
     def add(self, row: np.ndarray) -> None:
         """Append a row (33,) of 10 ms."""

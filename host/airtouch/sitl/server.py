@@ -19,7 +19,7 @@ from airtouch import __version__
 from airtouch import vehicle as vehicles
 from airtouch.errors import AirTouchError
 from airtouch.simulation import scenario as scenarios
-from airtouch.simulation.flight import Chosen, choose
+from airtouch.simulation.flight import Chosen, choose, metadata
 from airtouch.sitl.commander import PERIOD_S
 from airtouch.sitl.drone import Drone
 from airtouch.sitl.faults import LINE, Fault, Line, parse
@@ -58,7 +58,10 @@ class Server:
         active = choose(self.plan, effects, without)
         self.drone = Drone(self.plan, craft, seed, flight, active, ai_deck)
         self.firmware = Firmware(self.drone, ai_deck)
-        self.recorder = Recorder(record, scene.name, craft.name, seed, flight, force) if record else None
+        meta = metadata(self.plan, craft, seed, flight, active, scene.name)
+        # the speed is its client's, not the one that was drawn for the scenario's mission
+        meta["condition"] = {name: value for name, value in self.plan.values.items() if name != "speed"}
+        self.recorder = Recorder(record, meta, force) if record else None
         self.speed = speed
         self.client: crtp.Peer | None = None
         rng = np.random.default_rng([seed, flight, 11])

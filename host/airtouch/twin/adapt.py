@@ -25,7 +25,7 @@ from airtouch.detector.shared.training_set import flight_hash
 from airtouch.logs.edges import Edge
 from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.scenario import Scenario
+from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.twin import cache, edge_strength, overlay
 from airtouch.vehicle import Vehicle
 
@@ -156,7 +156,8 @@ def simulated_flights(flights: Sequence[LoadedFlight], scene: Scenario, vehicle:
                                                             progress=progress)
         return SimulatedFlights(twin_logs, [None] * len(twin_logs)), description
     report = (lambda done, total: progress("simulated edges", done, total, "")) if progress else (lambda *_: None)
-    digest = hashlib.sha256(repr((STAGE_VERSION, scene.table, vehicle, seed)).encode()).hexdigest()[:12]
+    settings = (STAGE_VERSION, scene.table, vehicle, _equations(scene, vehicle), seed)
+    digest = hashlib.sha256(repr(settings).encode()).hexdigest()[:12]
     responses = overlay.simulate_responses(scene, vehicle, TWIN_FLIGHTS, seed, report,
                                            work / f"edges_{digest}" if work else None)
     factors = edge_strength.strengths([f.log for f in flights if f.labelled], responses)
@@ -280,10 +281,15 @@ def _with_name(progress: Progress | None, name: str) -> Progress | None:
     return lambda stage, done, total, note: progress(f"{name}: {stage}", done, total, note)
 
 
+def _equations(scene: Scenario, vehicle: Vehicle) -> str:
+    """`cache.equations` of the vehicle as the scenario's flights have it."""
+    return cache.equations(draw_flight(scene, 0, 0).with_changes(vehicle))
+
+
 def _key(flights: Sequence[LoadedFlight], scene: Scenario, vehicle: Vehicle, start: BestModel | None, seed: int) -> str:
     """Hash of everything that the result depends on."""
-    settings = (STAGE_VERSION, scene.table, vehicle, seed, TWIN_FLIGHTS, STEPS, AUGMENTATION, ROUNDS, DECODER,
-                *edge_strength.BOUNDS)
+    settings = (STAGE_VERSION, scene.table, vehicle, _equations(scene, vehicle), seed, TWIN_FLIGHTS, STEPS,
+                AUGMENTATION, ROUNDS, DECODER, *edge_strength.BOUNDS)
     digest = hashlib.sha256(repr(settings).encode())
     for flight in flights:
         digest.update(f"{flight_hash(flight.log)} {flight.labelled} {flight.file.condition}".encode())

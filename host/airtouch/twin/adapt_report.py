@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
 from airtouch.detector import best
 from airtouch.detector.evaluation import evaluate, summary
 from airtouch.detector.evaluation.data.dataset import FlightFile
@@ -43,6 +44,33 @@ def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
         except AirTouchError as error:
             left_out.append((str(file.path), str(error)))
     return usable, left_out
+
+
+def check_vehicle(twin: object, vehicle: object) -> None:
+    """Raise AirTouchError for a twin and a vehicle together."""
+    if twin is not None and vehicle is not None:
+        raise AirTouchError("a twin has a vehicle of its own; leave --vehicle out")
+
+
+def prepared(files: Sequence[FlightFile], out: Path, twin: Path | None, vehicle: Vehicle | str | Path | None, *,
+             speed_mps: float | None, seed: int, bar: calibrate.Bars, note: Callable[[str], None] = lambda _: None,
+             ) -> tuple[list[LoadedFlight], list[tuple[str, str]], calibrate.Twin, Path]:
+    """The flights to adapt to, (path, reason) of the others, the twin, and the folder of finished stages beside `out`.
+
+    twin: its folder, else one is fitted, from a vehicle. note: called with each reason. Raises AirTouchError where no
+    flight can be used.
+    """
+    with bar("reading") as step:
+        usable, left_out = readable(files, progress=lambda done, total: step(done, total, ""))
+    for _, reason in left_out:
+        note(reason)
+    if not usable:
+        first = f" ({left_out[0][1]})" if left_out else ""
+        raise AirTouchError(f"no flight that can be trained on{first}; fly straight over a platform's two edges, with "
+                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
+    craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
+    work = out.with_suffix(".adapt")
+    return usable, left_out, twin_for(usable, twin, craft, work, speed_mps=speed_mps, seed=seed, bar=bar), work
 
 
 def twin_for(usable: Sequence[LoadedFlight], folder: Path | None, vehicle: Vehicle, work: Path, *,

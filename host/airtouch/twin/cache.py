@@ -1,14 +1,26 @@
 """Models and scores in files: an adaptation that was stopped goes on with what it has finished."""
 
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
 
+from airtouch import __version__
 from airtouch.detector import best
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import read_text, write_bytes
+from airtouch.simulation.firmware import settings
+from airtouch.vehicle import Vehicle
+
+
+def equations(vehicle: Vehicle) -> str:
+    """The version of AirTouch, and a hash of the settings of the firmware that the vehicle flies.
+
+    For the keys of stored results: `Vehicle.firmware` is a name or a path, and a file may have changed.
+    """
+    return f"{__version__} {hashlib.sha256(settings.load(vehicle.firmware).tobytes()).hexdigest()}"
 
 
 def model(path: Path, make: Callable[[], BestModel]) -> BestModel:

@@ -3,7 +3,7 @@
 import inspect
 import io
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -141,9 +141,15 @@ def test_a_damaged_file_is_one_clear_line(small, data):
         assert "\n" not in str(error) and "m.npz" in str(error) or "model" in str(error)
 
 
+def in_the_file(model, **fields):
+    """The model with these fields of its recipe in the file, which a recipe itself refuses."""
+    return replace(model, metadata={**model.metadata, "recipe": {**asdict(model.recipe), **fields}})
+
+
 @pytest.mark.parametrize(("change", "message"), [
     (lambda m: replace(m, recipe=replace(m.recipe, width=12)), "another shape"),
-    (lambda m: replace(m, recipe=replace(m.recipe, dilations=(1, 2, 999))), "shape is missing"),
+    (lambda m: in_the_file(m, dilations=[1, 2, 999]), "shape is missing"),
+    (lambda m: in_the_file(m, width=68), "shape is missing"),
     (lambda m: replace(m, metadata={**m.metadata, "lag_s": "soon"}), "not a number"),
     (lambda m: replace(m, metadata={**m.metadata, "decoder": {"a": 1}}), "decoder settings"),
 ])

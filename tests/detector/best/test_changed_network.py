@@ -11,6 +11,7 @@ from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.shared import sensors
+from airtouch.errors import AirTouchError
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
 from skips import needs
@@ -51,3 +52,20 @@ def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path):
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
     assert again.c_sources() and CHANNELS == trained.int8.layers[0].weights.shape[1] // SMALL.first_taps
+
+
+@pytest.mark.parametrize("change, message", [
+    ({"width": 10}, "multiple of 4, not 10"), ({"width": 68}, "4 to 64, not 68"), ({"width": 24.0}, "not 24.0"),
+    ({"first_taps": 0}, "first_taps"), ({"taps": 9}, "1 to 8, not 9"), ({"dilations": ()}, "number of dilations"),
+    ({"dilations": (1,) * 10}, "1 to 9, not 10"), ({"dilations": (1, 512)}, "1 to 256, not 512"),
+    ({"muted": (CHANNELS,)}, "muted"), ({"sparsity": 1.0}, "below 1"), ({"sparsity": float("nan")}, "below 1")])
+def test_a_shape_that_no_model_file_holds_is_refused_before_the_training(change, message):
+    with pytest.raises(AirTouchError, match=message):
+        best.fit([made_flight()], **change)
+
+
+def test_the_widest_and_the_deepest_network_fit_the_kernels():
+    """The C takes 10 convolutions and a window of at most 65,535 samples (gap8/kernels/stream_int8.h)."""
+    widest = Recipe(width=64, first_taps=16, taps=8, dilations=(256,) * 9)
+    assert sum(layer.operation == CAUSAL_CONV for layer in widest.graph) == 10
+    assert widest.receptive_samples < 65_535

@@ -1,6 +1,7 @@
 """Training that goes on from a model, with labels of its own, and free air; which flights a model knows."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -122,6 +123,12 @@ def test_a_model_without_hashes_knows_names():
     assert training_set.contains({"flights": ["made0.csv"]}, log)
     assert not training_set.contains({"flights": ["made0.csv"], "flight_hashes": ["0" * 16]}, log)
     assert not training_set.contains({}, log)
+
+
+def test_a_model_knows_the_free_air_that_it_and_its_start_learnt_silence_from():
+    start = SimpleNamespace(metadata=training_set.of([made_flight(0)], None, [made_flight(1)]))
+    metadata = training_set.of([made_flight(2)], start, [made_flight(3)])
+    assert [training_set.contains(metadata, made_flight(i)) for i in range(5)] == [True] * 4 + [False]
 
 
 def test_a_training_that_was_stopped_goes_on_to_the_same_bits(tmp_path, monkeypatch):

@@ -74,3 +74,12 @@ def test_false_edges_stay_unknown_where_no_score_knows_the_truth():
     blind = FlightScore("a", Condition(), (), None, 3, 60.0)
     assert one_a_flight([blind, blind])[0].false is None
     assert summarise(one_a_flight([blind, blind]))["false_per_minute"] is None
+
+
+def test_hits_are_unknown_where_the_speed_of_a_detected_edge_is():
+    detected, missed = EdgeScore("entry", 100, 110, "entry", -0.1, None), EdgeScore("exit", 500)
+    table = summarise([FlightScore("a", Condition(), (detected, missed), (), 1, 30.0)])
+    assert table["mean_abs_error_m"] is None and set(table["hit"].values()) == {None}
+    assert table["missed"] == 0.5
+    table = summarise([FlightScore("a", Condition(), (missed,), (), 1, 30.0)])
+    assert set(table["hit"].values()) == {0.0}, "a missed edge is no hit, whatever the speed"

@@ -9,8 +9,12 @@ from airtouch.detector import paper
 from airtouch.detector.paper import rolling
 from airtouch.detector.paper.features import pipeline
 from airtouch.errors import AirTouchError
+from airtouch.kernels import edge_pipeline
 from airtouch.kernels.app_core import LINK, PARAM_TYPES, PARAMS, AppCore
 from airtouch.kernels.library import ffi, lib
+from airtouch.parameters import DEFAULT
+from airtouch.reference import EdgePipelineConfig
+from airtouch.vehicle import load
 from firmware.drone import Drone, edges_and_rows
 
 OUT_OF_RANGE = {"enable": (9, 1), "detector": (77, 4), "filter": (3, 2), "bandMid": (1e9, 48.0),
@@ -32,6 +36,19 @@ def test_a_parameter_out_of_range_is_put_right_counted_and_logged(flight, name):
         default = AppCore().params()[name]
         assert drone.app.set_params(**{name: np.nan}) == 1
         assert drone.app.params()[name] == pytest.approx(default)
+
+
+@pytest.mark.parametrize("width", [0.0, 9.0, 1.3])
+@pytest.mark.parametrize("middle", [0.0, 99.0, 7.24, 31.0])
+@pytest.mark.parametrize("p_fa", [0.0, 1.0])
+def test_whatever_is_set_the_pipeline_takes_what_is_in_force(width, middle, p_fa):
+    """The app drops the answers of edgePipelineInit and its two setters: they must not be able to fail."""
+    force = AppCore({"bandWidth": width, "bandMid": middle, "pFa": p_fa}).params()
+    half, zeros = force["bandWidth"] / 2, np.zeros((250, 10))
+    settings = replace(DEFAULT, p_fa=force["pFa"], band_low_hz=force["bandMid"] - half,
+                       band_high_hz=force["bandMid"] + half)
+    events = edge_pipeline(zeros[:, :3], zeros[:, 3:6], zeros[:, 6:], load(), config=EdgePipelineConfig(settings))
+    assert events.ready.any() and np.isfinite(events.band_power[-1]).all()
 
 
 @pytest.mark.parametrize("entry, leave", [(0.97, 0.93), (0.3, 0.25), (0.3, 0.6)])

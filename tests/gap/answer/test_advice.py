@@ -28,6 +28,11 @@ def test_named_effects_are_switched_on_in_the_simulator():
     assert words[words.index("--effect") + 1] == "imu_bias:acc_x=0.8m/s^2"
 
 
+def test_a_passing_effect_is_said_to_act_for_the_whole_flight_in_the_simulator():
+    (step,) = advice(diagnosis(effects=(NamedEffect("wind", {}, seconds=(("a.csv", 1.0, 2.0),)),)))
+    assert "acts for the whole flight" in step.text
+
+
 @pytest.mark.parametrize("vehicle", [replace(VEHICLE, name="my drone"), replace(VEHICLE, mass_kg=0.05)])
 def test_a_vehicle_of_a_file_of_its_own_is_named_by_a_file(vehicle):
     """`--vehicle` takes no name of a vehicle that is not built in, and would take another one for one that is."""
@@ -41,6 +46,12 @@ def test_none_asks_for_nothing_to_be_added():
     assert step.text.startswith("Nothing to add") and not step.command
 
 
+def test_none_with_a_floor_that_is_extrapolated_asks_for_another_baseline():
+    answer = replace(diagnosis(verdict="none", effects=()), baseline=BASELINE, indistinguishable=())
+    (step,) = next_steps(answer, WITH_GYRO, VEHICLE, extrapolated=True)
+    assert step.text.startswith("Fly the baseline like the test")
+
+
 @pytest.mark.parametrize("phase", sorted(MISSIONS))
 def test_an_open_gap_is_flown_again_in_its_phase(phase):
     again, own = advice(diagnosis([cell("force_z", phase, 1.0)], "unknown", ()))
@@ -52,9 +63,9 @@ def test_an_open_gap_at_landing_is_flown_again_as_it_was():
     assert "same flight three times" in again.text and not again.command
 
 
-def test_effects_that_look_alike_come_first_and_what_is_missing_last():
+def test_a_baseline_that_is_missing_comes_first_then_effects_that_look_alike():
     answer = replace(diagnosis(), baseline=())
-    alike, switch_on, baseline, gyro = next_steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
+    baseline, alike, switch_on, gyro = next_steps(answer, [SimpleNamespace(rates=None)], VEHICLE)
     assert alike.text.startswith("To tell mass from thrust_coefficient: ")
     assert "--effect" in switch_on.command and "--baseline" in baseline.command and "gyro" in gyro.text
 

@@ -87,6 +87,17 @@ def test_nothing_is_drawn_where_nothing_is_judged():
     np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
 
 
+@pytest.mark.parametrize("band_hz", [(0.0, 0.5), (25.0, 50.0)])
+def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz):
+    """A constant gap, with 50 m/s^2 in the rows that stand for those that were lost."""
+    lost = (TIME_S >= 7.0) & (TIME_S < 7.1)
+    lossy_flight = flight(SECONDS, np.where(lost[:, None], 50.0, FORWARD), lost=lost)
+    drawn = pictures(lossy_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
+    for curve in (drawn.before, drawn.measured):
+        assert np.isnan(curve[lost]).all()
+        np.testing.assert_allclose(curve[~lost], 0.5, atol=1e-9)
+
+
 def test_flight_of_the_signal_is_that_of_the_median_gap():
     """By the standard deviation in the cell's channel; in another channel their order is another."""
     noisy_flights = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))

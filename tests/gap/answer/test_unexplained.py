@@ -36,6 +36,13 @@ def test_a_channel_that_a_log_lacks_has_no_ratio():
     assert np.isnan(ratios_of_blocks(hover(0.0), gap, replace(CELL, channel="rate_x"))).all()
 
 
+def test_lost_rows_add_nothing_to_the_ratio():
+    """A constant gap has none between 2 and 6 Hz, whatever stands in the rows that were lost."""
+    lost = np.arange(4000) % 1000 < 20
+    force = np.where(lost, 50.0, 0.3)[:, None] * [1.0, 0.0, 0.0]
+    assert ratio_of(flight(40.0, force, lost=lost)).max() < 1e-9
+
+
 def test_a_command_is_held_against_the_floor_of_its_cell():
     """The replay's own floor says nothing of commands, whose floor is that of the loop."""
     one, gap = hover(0.0), np.zeros((4000, COUNT))
@@ -71,22 +78,51 @@ def test_open_cell_has_flight_and_seconds_of_the_largest_gap():
 def test_open_cell_has_seconds_of_its_own_phase():
     """The gap is strongest in cruise; an entry of the hover tells the worst of the hover, and what goes with it there.
 
-    Where no block is mostly of the phase, all count.
+    A phase that no flight has is not reported.
     """
     t = np.arange(4000) / 100.0
     strength = np.where(t >= 25.0, 9.0, np.where((t >= 8.0) & (t < 14.0), 3.0, 0.1))
     phase = np.where(t >= 25.0, KINDS.index("cruise"), KINDS.index("hover"))
     cells = [CELL, replace(CELL, phase="cruise"), replace(CELL, phase="landing")]
-    hovering, cruising, landing = unexplained(STUDY, [hover(strength, phase=phase)], selection(), cells)
+    hovering, cruising = unexplained(STUDY, [hover(strength, phase=phase)], selection(), cells)
     assert (hovering.from_s, hovering.to_s) == pytest.approx((8.0, 14.0), abs=LENGTH[AIR] / 100.0)
     assert hovering.over_floor < 0.5 * cruising.over_floor and cruising.from_s > 22.0
-    assert landing.from_s == cruising.from_s and landing.over_floor == cruising.over_floor
+
+
+def test_a_phase_shorter_than_a_block_has_its_own_seconds_and_ratio():
+    """A landing of 1 s that shakes at 4 Hz, with an rms of three floors, after a hover whose gap is far larger.
+
+    One number of such a short phase says nothing of what it follows.
+    """
+    t = np.arange(4000) / 100.0
+    landing = t >= 39.0
+    force = noise(40.0, 9.0, 2) * ((t >= 8.0) & (t < 14.0))[:, None]
+    force[landing, 0] = 3.0 * CELL.floor * np.sqrt(2.0) * np.cos(2.0 * np.pi * 4.0 * t[landing])
+    phase = np.where(landing, KINDS.index("landing"), KINDS.index("hover"))
+    shaken, calm = flight(40.0, force, phase=phase, name="shaken.csv"), flight(40.0, phase=phase, name="calm.csv")
+    cells = [CELL, replace(CELL, phase="landing")]
+    hovering, landed = unexplained(STUDY, [calm, shaken], selection(), cells)
+    assert hovering.over_floor > 10.0 and hovering.to_s < 20.0
+    assert (landed.flight, landed.from_s, landed.to_s) == ("shaken.csv", 39.0, 40.0)
+    assert landed.over_floor == pytest.approx(3.0, rel=0.15) and landed.follows == ()
+
+
+def test_lost_rows_do_not_count_in_a_phase_shorter_than_a_block():
+    """The lines that stand for 0.2 s of lost rows differ from a flight at its floor by a hundred floors."""
+    t = np.arange(4000) / 100.0
+    lost = (t >= 39.4) & (t < 39.6)
+    force = np.where(lost, 100.0, np.cos(2.0 * np.pi * 4.0 * t) * np.sqrt(2.0) * (t >= 39.0))[:, None] * CELL.floor
+    phase = np.where(t >= 39.0, KINDS.index("landing"), KINDS.index("hover"))
+    (landed,) = unexplained(STUDY, [flight(40.0, force, phase=phase, lost=lost)], selection(),
+                            [replace(CELL, phase="landing")])
+    assert 0.5 < landed.over_floor < 1.2
 
 
 def test_at_most_five_cells_are_reported():
     cells = [cell("force_x", phase, 1.0, band_hz=band) for band in ((0.5, 2.0), (2.0, 6.0))
              for phase in ("hover", "cruise", "landing")]
-    assert len(unexplained(STUDY, [hover(0.1)], selection(), cells)) == 5
+    phase = np.repeat([KINDS.index(name) for name in ("hover", "cruise", "landing")], [1500, 1500, 1000])
+    assert len(unexplained(STUDY, [hover(0.1, phase=phase)], selection(), cells)) == 5
 
 
 STEADY = UnsteadinessRarity()

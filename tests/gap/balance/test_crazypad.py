@@ -10,6 +10,7 @@ from airtouch.gap.balance.hover_pattern import HoverPattern
 from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs import read
+from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active, get
@@ -151,6 +152,17 @@ def test_a_further_normal_flight_is_none(pad, nominal):
 def test_a_normal_flight_whose_position_was_measured_badly_is_none(pad, nominal):
     result = diagnose([pad("normal_flight_E8_log03")], FLOWN, nominal["E8"][:3])  # 18 times their corrections
     assert (result.verdict, result.effects) == ("none", ())
+
+
+def test_a_normal_flight_of_whose_hover_five_seconds_are_lost_is_none(pad, nominal):
+    """Straight lines over the lost rows are steadier than any flight: they were a weak motor, at 92 %."""
+    log = pad("normal_flight_E8_log01")
+    logged = np.ones(len(log), bool)
+    logged[1886:2386] = False
+    result = diagnose([FlightLog({k: v[logged] for k, v in log.columns.items()}, log.meta)], FLOWN,
+                      [nominal["E8"][i] for i in (0, 2, 3)])
+    assert (result.verdict, result.effects) == ("none", ())
+    assert any("log01.csv.gz: 34% of what is flown was not logged" in note for note in result.notes)
 
 
 def test_flights_of_one_condition_together(pad, nominal):

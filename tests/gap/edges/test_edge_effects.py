@@ -1,5 +1,6 @@
 """What effects add at edges against flights that were flown with them, and what is left of it without a velocity."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -81,6 +82,21 @@ def test_it_grows_with_its_parameters_and_effects_add_up(floor, nominal):
     np.testing.assert_allclose(once, 2.0 * half, rtol=1e-9)
     np.testing.assert_allclose(both, alone[0] + alone[1], rtol=1e-9)
     assert not added_response(floor, flight, edge, activate({"mass": {"fraction": 0.1}})).any()
+
+
+@pytest.mark.parametrize("lacking", [0, 1])
+def test_an_edge_that_was_not_simulated_adds_nothing(monkeypatch, floor, nominal, lacking):
+    """The down range sees no platform in the flights without the effect (0), or in those with it (1)."""
+    def simulated(*args, effects, **options):
+        logs = list(batch.flights(*args, effects=effects, **options))
+        is_flat = len(effects) == lacking
+        return [log.with_columns({"zrange_m": np.full(len(log), 0.5)}) for log in logs] if is_flat else logs
+
+    assert added_response(floor, nominal[0], edges_of(nominal[0])[0], activate(STEP)).any()
+    monkeypatch.setattr(edge_effects, "simulated", simulated)
+    another = replace(floor)  # nothing is simulated yet
+    for edge in edges_of(nominal[0]):
+        assert not added_response(another, nominal[0], edge, activate(STEP)).any()
 
 
 @pytest.mark.parametrize("effects", [STEP, FLOW])

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
-from airtouch.gap.edges.edge_response import BINS, SHRINKAGE, edges_of, logged, response, response_covariance
+from airtouch.gap.edges import edge_response
+from airtouch.gap.edges.edge_response import (
+    BINS,
+    SHRINKAGE,
+    edge_floor_of,
+    edges_of,
+    logged,
+    response,
+    response_covariance,
+)
 from airtouch.logs.flight_log import PWM, FlightLog
 from gap_flights import fly
 
@@ -64,3 +73,27 @@ def test_an_edge_that_is_hit_or_lost_is_no_evidence(name, samples, counts):
         lost[at] = True
     of_evidence = edges_of(replace(flight, usable=usable, lost=lost))
     assert (edges[0] in of_evidence) == counts and set(edges[2:]) <= set(of_evidence)
+
+
+@pytest.mark.parametrize("name", ["usable", "lost"])
+def test_a_scatter_is_not_measured_where_the_flight_is_hit_or_lost(name):
+    """The flight is evidence at its edges, and nowhere else: of a stretch without an edge nothing is known."""
+    flight = fly(1, 31)[0]
+    edges = edges_of(flight)
+    assert {e.kind for e in edges} == {"entry", "exit"} and edge_floor_of([flight], VEHICLE, ()) is not None
+    samples = np.arange(len(flight))
+    at_an_edge = np.any([(samples >= e.sample - 30) & (samples < e.sample + 130) for e in edges], axis=0)
+    away = {"usable": at_an_edge} if name == "usable" else {"usable": at_an_edge, "lost": ~at_an_edge}
+    hit = replace(flight, **away)
+    assert edges_of(hit) == edges and edge_floor_of([hit], VEHICLE, ()) is None
+
+
+def test_a_stretch_without_an_edge_shares_no_sample_with_a_response_to_one(monkeypatch):
+    """A response has the 0.3 s before its sample and the 1.3 s after it."""
+    flight, at = fly(1, 31)[0], []
+    edges = [e.sample for e in edges_of(flight)]
+    monkeypatch.setattr(edge_response, "response",
+                        lambda log, vehicle, sample: at.append(sample) or response(log, vehicle, sample))
+    assert edge_floor_of([flight], VEHICLE, ()) is not None and set(edges) < set(at)
+    near_edges = {k for e in edges for k in range(e - 30, e + 130)}
+    assert not [a for a in set(at) - set(edges) if near_edges & set(range(a - 30, a + 130))]

@@ -128,6 +128,12 @@ def test_a_log_that_lost_many_rows_is_no_slower_log(log, jitter_s):
     assert jitter_s or len(flight) == pytest.approx(len(log), rel=0.01)
 
 
+@pytest.mark.parametrize("share", [0.4, 0.45])
+def test_the_rows_that_a_log_lost_are_found_where_nearly_half_are_lost(log, share):
+    gone = 50 + np.flatnonzero(np.random.default_rng(1).random(len(log) - 100) < share)
+    np.testing.assert_array_equal(np.flatnonzero(as_flight(without(log, *gone)).lost), gone)
+
+
 @pytest.mark.parametrize("with_clock", [True, False])
 def test_a_slower_log_is_refused(log, with_clock):
     slow, reasons = at_rate(log, 50.0), []

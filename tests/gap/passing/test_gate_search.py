@@ -8,8 +8,11 @@ import pytest
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import PERIOD_S
+from airtouch.gap.passing import gate_search
 from airtouch.gap.passing.bursts import FORCE_BURSTS, burst_gate
-from airtouch.gap.passing.gate_search import MOST_INTERVALS, best_intervals, interval_cost
+from airtouch.gap.passing.gate_search import MOST_INTERVALS, STEPS_S, best_intervals, interval_cost
+from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.signatures.candidates import term_of
 from hovers import FLOOR, hover
 
 
@@ -34,6 +37,24 @@ def test_a_flight_has_no_more_than_so_many_intervals():
     gain = np.tile([10.0, -50.0], 10)
     assert best_intervals(gain, np.zeros(20, int), 1.0) == [(2 * k, 2 * k) for k in range(MOST_INTERVALS)]
     assert len(best_intervals(gain, np.repeat([0, 1], 10), 1.0)) == 2 * MOST_INTERVALS
+
+
+@pytest.mark.parametrize("other", ["a.csv", "b.csv"])
+def test_moved_ends_stop_at_the_next_interval_of_the_flight(monkeypatch, other):
+    """Where an effect explains every second of two flights, its intervals grow until they meet."""
+    push = term_of(NamedEffect("wind", {"x": Quantity(0.3)}))
+    monkeypatch.setattr(gate_search, "judge", lambda _data, _blocks, terms: seconds_in(terms[0].gate))
+    first, second = gate_search._sharpen(None, None, [push], (("a.csv", 2.0, 5.0), (other, 5.3, 9.0)))
+    assert first[1] < 2.0 and second[2] > 9.0
+    if other == "a.csv":
+        assert 5.0 < first[2] <= second[1] < first[2] + STEPS_S[-1]
+    else:
+        assert first[2] > 5.3 and second[1] < 5.0
+
+
+def seconds_in(gate):
+    """Seconds of all flights within a gate, to 10 ms."""
+    return 0.01 * len({(name, k) for name, since, until in gate for k in range(round(100 * since), round(100 * until))})
 
 
 def shaken(since_s, until_s, factor):

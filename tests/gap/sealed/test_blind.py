@@ -84,12 +84,13 @@ def test_the_key_is_opened_for_the_answers_to_all_flights(tmp_path, monkeypatch)
         for name, without in cases:
             blind_run._place(answers, name, without).write_text(json.dumps({"flight": name, "without": without}))
 
-    def open_key(folder, answers):
+    def open_key(folder, answers, key):
         opened.append(answers)
         mass = blind_key.DrawnEffect("mass", "mass", 0, {})
         return blind_key.Key({n: blind_key.DrawnFlight((mass,)) for n in names})
 
-    for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None)):
+    for name, stand_in in (("answer", answer), ("open_key", open_key), ("study_in", lambda _: None),
+                           ("sealed_key", lambda *_: b"{}")):
         monkeypatch.setattr(blind_run, name, stand_in)
     monkeypatch.setattr(blind_run.score, "score", lambda *_: {})
     for _ in range(2):  # the second time with the answers without an effect
@@ -288,7 +289,7 @@ def test_scores_in_closed_form():
     assert figures["parameters"]["error"]["value"] == pytest.approx(0.2)
     assert figures["parameters"]["coverage"]["hits"] == 1
     ideal = {level: (part["ideal"]["hits"], part["ideal"]["n"]) for level, part in figures["by_severity"].items()}
-    assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 26th of 2 % of the flights
+    assert ideal == {"weakest": (0, 1), "2x": (1, 1)}  # chance exceeds 3 nats, not 9, in a 27th of 2 % of the flights
     assert figures["shrink"]["right"]["value"] == pytest.approx(0.9) and figures["shrink"]["wrong"]["value"] == 0.0
     left_out = figures["unknown"]["all"]
     assert left_out["auroc"] == left_out["auroc_told_apart"] == 1.0 and left_out["wrong_name"]["hits"] == 0
@@ -327,6 +328,22 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
         (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
 
 
+@pytest.mark.parametrize(("name", "drawn", "answered", "error"), [
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"strength": 0.2}, 1.0),
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"strength": 0.0}, 1.0),
+    ("battery_sag", {"strength": 0.1, "charge": 0.8, "capacity": 1.0}, {"charge": 0.4, "capacity": 0.2}, 0.0),
+    ("slung_load", {"load": 0.002, "length": 0.2}, {"load": 0.004}, 1.0),
+    ("wind", {"x": 0.3, "y": 0.0, "z": 0.0}, {"x": 0.7}, 4.0 / 3.0)])
+def test_the_error_is_that_of_parameters_with_a_neutral_value(name, drawn, answered, error):
+    """A strength twice too large is 100 % off, however well the charge of the battery or the length is known."""
+    quantities = {k: {"value": x, "low": x, "high": x} for k, x in (drawn | answered).items()}
+    key = blind_key.Key({"a": blind_key.DrawnFlight((blind_key.DrawnEffect(name, name, 0, drawn),))})
+    figures = blind_score.figures(key, [answer("a", "effect", [(name, 1.0)], [(name, quantities)])])
+    assert figures["parameters"]["error"]["value"] == pytest.approx(error)
+    assert (figures["parameters"]["coverage"]["hits"], figures["parameters"]["coverage"]["n"]) == \
+        (len(drawn) - len(answered), len(drawn))
+
+
 def test_flights_are_counted_whose_kind_has_no_strength_four_times_the_weakest():
     """Mass up to 0.2 where 0.1 can be seen, and a kind with room to spare."""
     strengths = {"mass": three_severities(0.1, 0.2), "inertia": three_severities(0.1, 1.0)}
@@ -355,6 +372,12 @@ def test_answers_that_are_none(tmp_path):
         blind_answers.read_answers(tmp_path)
     (tmp_path / "x.json").write_text("no")
     with pytest.raises(AirTouchError, match="not the JSON"):
+        blind_answers.read_answers(tmp_path)
+    with pytest.raises(AirTouchError, match="gone.json: cannot be read: No such file or directory$"):
+        blind_answers.read_answers(tmp_path / "gone.json")
+    (tmp_path / "y.json").mkdir()
+    (tmp_path / "x.json").unlink()
+    with pytest.raises(AirTouchError, match="y.json: cannot be read: Is a directory$"):
         blind_answers.read_answers(tmp_path)
 
 

@@ -92,6 +92,39 @@ def test_the_numbers_of_the_set_or_none_go_on(tmp_path, monkeypatch, asked):
         blind_run.run(folder, *map(int, asked[1::2]))
 
 
+def test_a_key_elsewhere_is_asked_for_before_any_flight_is_diagnosed(tmp_path, monkeypatch):
+    """Every flight was diagnosed first, and the remedy named an option that there was not."""
+    folder, elsewhere = sealed_set(tmp_path / "set", flights=2, seed=5), tmp_path / "elsewhere.json"
+    blind_key.key_path(folder).rename(elsewhere)
+    monkeypatch.setattr(blind_run, "study_in", broken_off)  # with which diagnosing begins
+
+    def said(*options):
+        return CliRunner().invoke(command, ["blind", "run", str(folder), *options])
+
+    assert "the key cannot be read: No such file or directory; name it with --key" in str(said().exception)
+    assert "seed 5 is there, not 99" in str(said("--key", str(elsewhere), "--seed", "99").exception)
+    (tmp_path / "other.json").write_text("{}")
+    assert "not the key that was sealed" in str(said("--key", str(tmp_path / "other.json")).exception)
+    result = said("--key", str(elsewhere), "--seed", "5")
+    assert not isinstance(result.exception, AirTouchError) and result.exit_code == 1  # it came as far as the study
+    with pytest.raises(KeyboardInterrupt):
+        blind_run.run(folder, key=elsewhere)
+    assert not (folder / "opened.json").exists() and not list(folder.glob("answers/*"))
+
+
+def test_run_makes_a_set_with_its_key_where_it_is_asked_for(tmp_path, monkeypatch):
+    asked = []
+
+    def made(*_, key, **__):
+        asked.append(key)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(blind_run.make, "make", made)
+    with pytest.raises(KeyboardInterrupt):
+        blind_run.run(tmp_path, key=tmp_path / "elsewhere.json")
+    assert asked == [tmp_path / "elsewhere.json"]
+
+
 def test_a_damaged_record_of_the_opening_is_told(tmp_path):
     folder = sealed_set(tmp_path / "set")
     for content in ("", "[]", "{}"):

@@ -120,6 +120,13 @@ def test_networks_that_cannot_roll_are_refused() -> None:
         rolling.run_rolling(paper, np.zeros((10, 4), np.int8))
 
 
+def test_usable_is_one_flag_a_sample() -> None:
+    paper = random_model().int8
+    x = np.zeros((600, paper.input_shape[1] * paper.input_shape[2]), np.int8)
+    with pytest.raises(AirTouchError, match=r"usable must be \(600,\)"):
+        rolling.run_rolling(paper, x, 4, np.ones(10, bool))
+
+
 @given(st.lists(st.floats(0, 2.0**126, width=32), min_size=3, max_size=60))
 def test_the_fixed_scale_is_a_logarithm(values: list[float]) -> None:
     features = np.array(values[:len(values) // 3 * 3], np.float32).reshape(-1, 3)

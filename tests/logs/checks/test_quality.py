@@ -97,6 +97,18 @@ def test_a_flight_cut_high_in_the_air_has_no_take_off_and_no_landing(begins_m, e
     assert [s.kind for s in whole] == ["ground", "take-off", "hover", "landing", "ground"]
 
 
+def test_a_flight_that_lands_on_the_platform_has_a_landing():
+    """It comes to a platform of 0.4 m at 8 s and descends onto it from 15 to 18 s."""
+    time = 0.01 * np.arange(2000)
+    height = np.interp(time, [1, 3, 15, 18], [0.0, 0.8, 0.8, 0.4])
+    columns = {"t_s": time, "zrange_m": np.where(time < 8, height, height - 0.4)}
+    columns |= dict.fromkeys(PWM, np.where((time > 1) & (time < 18), 40000.0 + np.arange(2000) % 9, 0.0))
+    segments = logs.segments(FlightLog(columns, {"source": "made", "warnings": []}))
+    assert [s.kind for s in segments] == ["ground", "take-off", "cruise", "over platform", "landing", "ground"]
+    platform, landing = segments[3:5]
+    assert platform.start == 800 and 1500 < landing.start < 1600 and landing.stop == 1800
+
+
 def test_a_down_range_without_a_value_is_not_the_ground():
     """With `zrange_m` all NaN the whole flight was on the ground, whatever `z_m` said."""
     motors = np.r_[np.zeros(200), np.full(1600, 40000.0), np.zeros(200)]

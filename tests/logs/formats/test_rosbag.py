@@ -31,7 +31,7 @@ def bag_of(tmp_path):
         header = kind("std_msgs/msg/Header")(time, frame)
         pose = kind("geometry_msgs/msg/Pose")(point(float(np.max(value)), 0.0, 0.0), still)
         if name == RANGE:
-            return kind(name)(header, 0, 0.1, 0.0, 4.0, float(value))
+            return kind(name)(header, 0, 0.5, 0.1, 4.0, float(value))
         if name == IMU:
             return kind(name)(header, still, np.r_[-1.0, np.zeros(8)], vector(0.0, 0.0, 0.0), zeros,
                               vector(float(value), 0.0, 9.81), zeros)
@@ -117,3 +117,10 @@ def test_motors_without_a_header_keep_their_place_where_the_headers_count_from_z
 def test_a_column_that_is_empty_in_the_flight_is_named(bag_of):
     log = bag_of({"/motor_pwm": (SHORTS, "", np.full((20, 4), 30_000)), "/tof": (RANGE, "", np.full(20, np.nan))})
     assert [w for w in log.meta["warnings"] if "empty" in w] == ["zrange_m is empty: no value while the IMU was logged"]
+
+
+@pytest.mark.parametrize(("metres", "valid"), [(0.11, True), (3.9, True), (0.09, False), (4.1, False), (32.767, False)])
+def test_a_range_outside_of_its_messages_limits_is_missing(bag_of, metres, valid):
+    """By Range.msg: values outside of min_range and max_range, here 0.1 to 4 m, should be discarded."""
+    log = bag_of({"/down": (RANGE, "body", np.full(20, metres))})
+    assert np.isfinite(log["zrange_m"]).all() == np.isfinite(log["zrange_m"]).any() == valid

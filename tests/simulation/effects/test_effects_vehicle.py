@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.simulation import effects, replay
 from airtouch.simulation.body import battery
@@ -81,6 +82,16 @@ def test_motor_lag_may_differ_between_rise_and_fall(vehicle):
     speed = rotor_speeds(pwm, vehicle, {"motor_lag": {"factor": 1.0, "fall": 2.0}}).rotor_speed[:, 0]
     share = (speed - speed[0]) / (speed[-1] - speed[0])
     assert 0.002 * (np.argmax(share >= 1 - np.exp(-1)) - 500) == pytest.approx(0.12, abs=0.003)
+
+
+def test_an_actuator_delay_longer_than_the_delay_line_is_refused(vehicle):
+    """A line of 64 samples: up to 63 of them the thrust is shifted, beyond it no other delay is flown instead."""
+    pwm = np.r_[np.full(200, 30000.0), np.full(800, 45000.0)]
+    late = {"actuator_delay": {"delay": 0.1}}
+    speed = rotor_speeds(pwm, vehicle, late, period_s=0.002).rotor_speed[:, 0]
+    assert np.argmax(speed > speed[0] + 1.0) - 200 == pytest.approx(0.1 / 0.002, abs=2)
+    with pytest.raises(AirTouchError, match="actuator_delay = 0.1 s"):
+        rotor_speeds(pwm, vehicle, late, period_s=0.001)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.004, 0.013, 0.03])

@@ -1,5 +1,7 @@
 """Effects that a user thinks of first, each written as one file and flown by `simulate`: they do what they say."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,15 @@ def test_a_load_that_falls_onto_the_drone_half_way(fly_columns):
     later = [np.mean([hovering(c, f"m{i}_pwm", 9.0, 11.0).mean() for i in range(1, 5)]) for c in (nominal, with_load)]
     assert pwm[0] == pytest.approx(pwm[1], abs=1.0)
     assert later[1] / later[0] - 1.0 > 0.05  # 14 % more weight
+
+
+def test_threads_that_load_one_effect_at_once_get_the_same_one():
+    """As the tasks of a dask worker do; the file takes 0.1 s to run, so that all of them are at it."""
+    text = "import time\n" + SETTINGS.format(name="own_of_threads", unit="1", default=0.3, most=1.0, body="pass")
+    text += "time.sleep(0.1)\n"
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            loaded = list(pool.map(effects.load_text, [text] * 4))
+        assert all(one == [effects.get("own_of_threads")] for one in loaded)
+    finally:
+        effects.unregister("own_of_threads")

@@ -84,7 +84,7 @@ def test_a_manifest_that_cannot_be_read_is_one_line(tmp_path):
 
 def run(folder, version=airtouch.__version__):
     """Fly the folder's short scenario into its folder `out`, by an AirTouch of a version; the refusal or None."""
-    with mock.patch("airtouch.__version__", version):
+    with mock.patch.object(store, "__version__", version):
         result = CliRunner().invoke(command, [str(folder / "short.toml"), "--out", str(folder / "out")])
     return result.exception and str(result.exception)
 

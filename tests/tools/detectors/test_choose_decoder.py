@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airtouch.detector import best
 from airtouch.detector.best.recipe import ROW_STRIDE
 from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.score import TOLERANCE_S
@@ -107,3 +108,15 @@ def test_a_file_of_figures_is_replaced_with_force_alone(tmp_path, monkeypatch):
         monkeypatch.setattr(sys, "argv", ["choose_decoder.py", str(tmp_path), "--json", str(figures), *more])
         with pytest.raises(AirTouchError, match=refusal):
             tool.main()
+
+
+@pytest.mark.parametrize("silent", [(), ("rates",), ("motors",)])
+def test_as_shipped_is_what_the_shipped_model_decodes_such_a_log_with(silent):
+    model = best.load(None).serving(silent)
+    assert tool.shipped(silent) == ("as shipped", model.decoder_without(silent))
+
+
+def test_without_acceleration_another_model_ships():
+    model = best.load(None).serving(("acceleration",))
+    title, config = tool.shipped(("acceleration",))
+    assert config != model.decoder_without(("acceleration",)) and "another model ships" in title

@@ -17,7 +17,14 @@ from made_flight import SMALL, made_flight
 from skips import needs
 from tools.detectors import train_without_acceleration as tool
 
-pytestmark = needs("tensorflow")
+
+def test_flights_of_no_fold_are_trained_on(tmp_path):
+    for i in range(3):
+        logs.write(made_flight(i), tmp_path / f"f{i}.csv")
+    assert len(tool.training_files([tmp_path], None)) == 3, "a folder without a manifest has no folds"
+    (tmp_path / "manifest.csv").write_text("file,fold\nf0.csv,0\nf1.csv,1\nf2.csv,\n")
+    assert len(tool.training_files([tmp_path], None)) == 3
+    assert [f.path.name for f in tool.training_files([tmp_path], 1)] == ["f0.csv", "f2.csv"]
 
 
 class Shortened(tuple):
@@ -54,6 +61,7 @@ def trained(tmp_path, monkeypatch):
     return scenes, best.load(out)
 
 
+@needs("tensorflow")
 def test_recorded_and_simulated_flights_have_half_each_and_no_acceleration(trained):
     ((scene, least), (flights, options)), model = trained
     assert scene == "twin/scenario.toml" and least == 0.3

@@ -111,6 +111,17 @@ def test_a_fit_of_other_flights_is_refused(aim, vehicle, chosen, tmp_path):
     assert fit.key(elsewhere, vehicle, chosen) == fit.key(aim, vehicle, chosen)
 
 
+def test_a_fit_with_another_firmware_or_version_is_another_fit(aim, vehicle, chosen, tmp_path, monkeypatch):
+    path = tmp_path / "mine.toml"
+    craft, keys = replace(vehicle, firmware=str(path)), []
+    for command in (36000, 46000, 36000):
+        path.write_text(f'base = "2026.08"\n[controller]\nthrust_base = {command}\n')
+        keys.append(fit.key(aim, craft, chosen))
+    assert keys[0] == keys[2] != keys[1]
+    monkeypatch.setattr("airtouch.twin.cache.__version__", "another")
+    assert fit.key(aim, craft, chosen) != keys[2]
+
+
 def test_regression_is_least_squares():
     """A linear world: the Jacobian and the gap at the centre come back."""
     rng = np.random.default_rng(0)

@@ -128,3 +128,17 @@ def test_hover_level_and_slope(sweeps):
     values = features(ramp, sweep)
     assert values[NAMES.index("hover PWM slope")] == pytest.approx(70.0, rel=1e-6)
     assert values[NAMES.index("trim motor roll")] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_sample_without_motor_commands_changes_the_hover_level_by_nothing_to_speak_of(sweeps):
+    """One of some hundred samples of a ramp of 70 PWM/s holds the one before, 0.7 PWM below."""
+    _, log, _ = sweeps[0]
+    sweep = course(log)
+    pwm = 40000.0 + 70.0 * np.arange(len(log)) * 0.01
+    whole, gap = pwm.copy(), pwm.copy()
+    gap[sweep.free.start + 50] = np.nan
+    of = [features(log.with_columns({f"m{i}_pwm": p for i in range(1, 5)}), sweep) for p in (whole, gap)]
+    for name, near in (("hover PWM", 0.01), ("hover PWM slope", 0.1)):
+        k = NAMES.index(name)
+        assert of[1][k] == pytest.approx(of[0][k], abs=near)
+    assert of[0][NAMES.index("hover PWM")] == pytest.approx(pwm[sweep.free].mean(), rel=1e-12)

@@ -235,7 +235,7 @@ def _report(outcome: "collect.Outcome") -> None:
     click.echo(f"{outcome.path}: {outcome.ended}; {len(log)} samples, {log.meta['lost_samples']} lost "
                f"({log.meta['lost_samples'] / total:.1%}), longest gap {log.meta['longest_gap_s']:.2f} s")
     start = log["t_s"][0]
-    edges = logs.true_edges(log)
+    edges = logs.true_edges(log, arm_pwm=vehicles.arm_pwm_of(log.meta))
     if outcome.use == "free-air":
         click.echo("no edge on this flight: listed as free-air, scores leave it out; fly over a platform, as the "
                    "mission sweep does over its own")

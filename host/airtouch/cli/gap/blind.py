@@ -71,13 +71,15 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 @click.option("--flights", "-n", type=click.IntRange(1),
               help="How many flights, by default 480; 42 % have one effect, 42 % none, the rest two.")
 @click.option("--seed", type=click.IntRange(0), help="Of the whole set, by default 0.")
+@click.option("--key", type=click.Path(path_type=Path, dir_okay=False), help="Where the key is, or goes; "
+              "default: OUT.key.json beside OUT.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1), help="Processes.")
 @click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler, instead of processes here.")
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure; default: OUT/figures.json.")
 @click.option("--force", is_flag=True, help="Replace the file of --json.")
-def blind_run(out: Path, flights: int | None, seed: int | None, workers: int, dask: str | None, json_path: Path | None,
-              force: bool) -> None:
+def blind_run(out: Path, flights: int | None, seed: int | None, key: Path | None, workers: int, dask: str | None,
+              json_path: Path | None, force: bool) -> None:
     """The whole check in the folder OUT: make a set, diagnose it, open the key, score.
 
     Goes on where it was broken off. Single effects are then diagnosed once more with the
@@ -97,7 +99,7 @@ def blind_run(out: Path, flights: int | None, seed: int | None, workers: int, da
         click.echo(f"{flights or check.FLIGHTS} flights; first the strengths of every effect, which take "
                    f"{SEVERITIES_TAKE}", err=True)
     with LateBar() as bar:
-        figures = check.run(out, flights, seed, workers=workers, mapper=spread, progress=bar)
+        figures = check.run(out, flights, seed, workers=workers, mapper=spread, key=key, progress=bar)
     _print_score(figures, json_path or out / "figures.json", out / "figures.png", True)
 
 

@@ -1,6 +1,6 @@
 """`airtouch gap diagnose`: which effect the simulator lacks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -48,8 +48,9 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     if partner and not baseline:
         raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
     with LateBar() as bar:
-        from airtouch.cli.gap import files, show
+        from airtouch.cli.gap import files, next_commands, show
         from airtouch.simulation import effects
+        from airtouch.vehicle import name_in
 
         for path in effect_files:
             effects.load_file(path)
@@ -59,13 +60,15 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         nominal_logs, logs = list(nominal), [] if each else list(flights)
         craft = files.vehicle_of(vehicle_name, flights if each else logs, nominal_logs)
         case = _case(craft, nominal_logs, without, list(partners))
-        if same := {p.resolve() for p in flights.paths} & {p.resolve() for p in nominal.paths}:
+        vehicle_named = vehicle_name or next(filter(None, (name_in(log.meta) for log in [*logs, *nominal_logs])), None)
+        if same := files.also_in(flights, nominal):
             click.echo(f"airtouch: {min(same).name}: is a baseline flight as well, and cannot differ from itself; "
                        f"give it once ({len(same)} of {len(flights)} flights)", err=True)
         if not each:
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
-            diagnosis = case(logs, progress=bar, pictures=bool(report))
+            diagnosis = next_commands.with_names(case(logs, progress=bar, pictures=bool(report)), vehicle_named, real,
+                                                 baseline)
             if json_path:
                 output.write_json(json_path, diagnosis.plain(), force)
             if report:
@@ -75,7 +78,8 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                 gap_report.write_diagnosis(report, diagnosis, command=typed(NAMES_SHOWN), force=force)
     diagnosed = 1
     if each:
-        diagnosed = _each(flights, case, json_path, runner(dask, effect_files), force)
+        diagnosed = _each(flights, case, lambda d: next_commands.with_names(d, vehicle_named, d.flights, baseline),
+                          json_path, runner(dask, effect_files), force)
     else:
         show.diagnosis(output.console(), diagnosis)
     show.left_out([*flights.failed.values(), *nominal.failed.values(), *partners.failed.values()])
@@ -93,8 +97,13 @@ def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) 
     return partial(diagnose.diagnose, vehicle=vehicle, baseline=nominal, without=tuple(without), partner=partner)
 
 
-def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, force: bool) -> int:
-    """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing."""
+def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | None, run: Callable,
+          force: bool) -> int:
+    """Diagnose each flight alone and print one row for each. Returns how many were; of none it writes nothing.
+
+    The JSON is written anew after each flight, so that what is done stays if the rest is broken off. with_names:
+    gives a diagnosis the names that were given in its commands.
+    """
     from functools import partial
 
     from rich.table import Table
@@ -105,7 +114,7 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
     with LateBar(len(flights), "diagnosing") as bar:
-        for diagnosis in run(partial(_alone, case), flights):
+        for diagnosis in run(partial(_alone, case), _told(flights, bar)):
             if isinstance(diagnosis, AirTouchError):
                 show.left_out([str(diagnosis)])
                 continue
@@ -114,12 +123,19 @@ def _each(flights: Any, case: Callable, json_path: Path | None, run: Callable, f
             table.add_row(Path(diagnosis.flights[0]).name, diagnosis.verdict,
                           "; ".join(words.effect_in_words(e) for e in diagnosis.effects),
                           f"{first.probability:.0%}")
-            rows.append(diagnosis.plain())
+            rows.append(with_names(diagnosis).plain())
+            if json_path:
+                output.write_json(json_path, {"cases": rows}, force or len(rows) > 1)
     if rows:
         output.console().print(table)
-    if rows and json_path:
-        output.write_json(json_path, {"cases": rows}, force)
     return len(rows)
+
+
+def _told(flights: Any, bar: LateBar) -> Iterator[Any]:
+    """The flights, each named on the bar before it is diagnosed."""
+    for log in flights:
+        bar.now(f"diagnosing {Path(log.source).name}")
+        yield log
 
 
 def _alone(case: Callable, log: Any) -> Any:

@@ -2,6 +2,7 @@
 
 import glob
 from collections.abc import Iterable, Iterator, Sequence
+from hashlib import sha256
 from itertools import chain
 from pathlib import Path
 
@@ -67,6 +68,20 @@ def files_of(names: Sequence[str]) -> list[Path]:
             raise AirTouchError(f"{name}: no such flight log; name a file, a folder of logs or a pattern")
         files.update(dict.fromkeys(paths))
     return list(files)
+
+
+def also_in(flights: Flights, baseline: Flights) -> list[Path]:
+    """The flights that are baseline flights as well: the same file, or a copy of one under another name."""
+    known = {_identity(path) for path in baseline.paths}
+    return [path for path in flights.paths if _identity(path) in known]
+
+
+def _identity(path: Path) -> str:
+    """Hash of a file's bytes; of a folder, and of a file that cannot be read, its absolute path."""
+    try:
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return str(path.resolve())
 
 
 def vehicle_of(named: str | None, flights: Iterable[FlightLog], baseline: Iterable[FlightLog] = ()) -> Vehicle:

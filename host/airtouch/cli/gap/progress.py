@@ -72,7 +72,12 @@ class LateBar:
             self.progress.stop()
 
     def __call__(self, text: str) -> None:
-        self.progress.update(self.task, advance=1, description=text[-60:])
+        self.progress.update(self.task, advance=1)
+        self.now(text)
+
+    def now(self, text: str) -> None:
+        """Describe the present step without ending one."""
+        self.progress.update(self.task, description=text[-60:])
         self._say(text)
 
     def expect(self, total: int) -> None:

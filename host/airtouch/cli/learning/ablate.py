@@ -1,5 +1,6 @@
 """`airtouch ablate`: what each part of the detectors is worth."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,8 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
             json_path: Path | None, force: bool) -> None:
     """Cross-validate the detectors on FOLDER with one thing changed at a time, split by flight.
 
-    Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Takes two to five minutes an ablation on two cores.
+    Without FOLDER: AIRTOUCH_FLIGHTS or ../shared/flights. Takes two to five minutes an ablation on two cores. Exit code
+    2 when a flight was left out.
     """
     check_free(json_path, force)
     folder = need_flights(folder)
@@ -56,6 +58,9 @@ def command(folder: Path | None, only: tuple[str, ...], steps: int | None, epoch
     if json_path:
         output.write_json(json_path, results, force)
         screen.print(f"written: {json_path}")
+    if any(row["left_out"] for row in results.values()):
+        click.echo("airtouch: flights were left out (see above)", err=True)
+        sys.exit(2)
 
 
 def _training(rows: dict[str, dict[str, Any]]) -> Table:

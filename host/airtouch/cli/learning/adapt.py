@@ -1,7 +1,6 @@
 """`airtouch adapt`: a detector for the drone that flew some flights."""
 
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import click
 from airtouch.cli.shared.options import seed_option, speed_option
 from airtouch.cli.shared.progress import Bar
 from airtouch.cli.shared.typed import typed
-from airtouch.errors import AirTouchError
 from airtouch.extras import need
 from airtouch.logs.files import check_free
 from airtouch.vehicle import DEFAULT_VEHICLE
@@ -51,7 +49,6 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     over a platform, the labels of a quarter of them are held out in turn to measure what to expect. Finished stages
     are stored beside --out, in a folder that ends in .adapt: the same command continues after a stop.
     """
-    from airtouch import vehicle as vehicles
     from airtouch.detector import best
     from airtouch.detector.evaluation.data import dataset
     from airtouch.detector.evaluation.data.folds import in_folds
@@ -60,14 +57,12 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     need("train", "training")
     started = time.monotonic()
     check_free(out, force)
-    if twin_folder and vehicle:
-        raise AirTouchError("--twin has a vehicle of its own; leave --vehicle out")
+    adapt_report.check_vehicle(twin_folder, vehicle)
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
-    usable = _read(in_folds(dataset.collect(flights, speed), folds))
+    files = in_folds(dataset.collect(flights, speed), folds)
+    usable, _, twin, work = adapt_report.prepared(files, out, twin_folder, vehicle, speed_mps=speed, seed=seed, bar=Bar,
+                                                  note=lambda reason: click.echo(f"airtouch: {reason}", err=True))
     labelled = [f for f in usable if f.labelled]
-    work = out.with_suffix(".adapt")
-    twin = adapt_report.twin_for(usable, twin_folder, vehicles.load(vehicle or DEFAULT_VEHICLE), work, speed_mps=speed,
-                                 seed=seed, bar=Bar)
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")
     with Stages() as stages:
@@ -76,20 +71,6 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     adapted.model.save(out, force)
     _say(adapted, len(labelled), hold_out)
     click.echo(f"written: {out} ({out.stat().st_size} bytes), {time.monotonic() - started:.0f} s")
-
-
-def _read(files: Sequence[Any]) -> list[Any]:
-    """The flights that can be trained on; says why the others cannot. Raises AirTouchError where none can."""
-    from airtouch.twin import adapt_report
-
-    with Bar("reading") as bar:
-        usable, left_out = adapt_report.readable(files, progress=bar)
-    for _, reason in left_out:
-        click.echo(f"airtouch: {reason}", err=True)
-    if not usable:
-        raise AirTouchError("no flight that can be trained on; fly straight over a platform's two edges, with "
-                            "acceleration, gyro and motors (one of the three may be missing) logged at 100 Hz")
-    return usable
 
 
 def _say(adapted: Any, labelled: int, hold_out: bool) -> None:

@@ -21,8 +21,9 @@ from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
 
 #: of `best`, printed and in the JSON
-DECODER_NOTE = ("the decoder's settings are the shipped ones, chosen over the five folds of the authors' flights "
-                "(host/docs/looks.md); weights and lag are of each fold's training flights alone")
+DECODER_NOTE = ("the decoder's settings and the recipe (width, steps, delay, choice of crops) are the shipped ones, "
+                "chosen over the five folds of the authors' flights (host/docs/looks.md); weights and lag are of each "
+                "fold's training flights alone")
 
 
 @click.command(name="crossval", epilog=examples(

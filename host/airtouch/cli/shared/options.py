@@ -16,6 +16,10 @@ class Finite(click.FloatRange):
             self.fail(f"{value} is not a finite number.", param, ctx)
         return number
 
+    def _describe_range(self) -> str:
+        """The range as a help page shows it, "" without bounds, for which click prints "x<=None"."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 SPEED_MPS = Finite(0, 100, min_open=True)  #: a commanded speed; no source: above any, in m/s
 

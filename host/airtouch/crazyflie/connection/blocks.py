@@ -80,11 +80,7 @@ def state_columns(block: Block, rows: Sequence[Mapping[str, float]]) -> dict[str
 
 def _columns(names: Sequence[str], rows: Sequence[Mapping[str, float]]) -> dict[str, np.ndarray]:
     table = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
-    columns = to_columns(table, {"warnings": []})
-    if "range.zrange" not in table:
-        columns.pop("zrange_m", None)
-    return {name: np.round(values, DECIMALS) for name, values in columns.items()
-            if not name.startswith("acc_world")}
+    return {name: np.round(values, DECIMALS) for name, values in to_columns(table, {"warnings": []}).items()}
 
 
 def hold(times_s: np.ndarray, slow_times_s: np.ndarray,

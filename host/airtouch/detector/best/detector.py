@@ -39,7 +39,8 @@ DECODER_WITHOUT = {
     "motors": DecoderConfig(over_share=0.3, entry_score=2.76, exit_score=2.55, late_entry=0.46, late_exit=-1.89,
                             smooth_gain=0.12, dwell_steps=20, arm_steps=100, look_back=50, hold_steps=20),
 }
-#: s, rms timing error of held-out flights with these settings, three seeds (printed by the same tool); for maps.
+#: s, rms timing error of held-out flights, all sensors, three seeds of the recipe of 2026-11-21 (printed by the same
+#: tool); for maps. Assumed for each model since.
 TIMING_SIGMA_S = 0.10
 SPARE_SENSORS = 1  #: of acceleration, rates and motors, one may be missing
 KINDS = {1: "entry", 2: "exit"}  #: the decoder's code of an edge -> its kind

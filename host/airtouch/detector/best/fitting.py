@@ -32,7 +32,7 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     seed: of the first weights, the crops and the draw of `settings.most_flights`.
     settings: `FitSettings()` for None. changes: fields of it, or of its recipe, by name: `fit(flights, steps=300)`.
     The model's lag is the median over the training flights, or over `settings.lag_of`; its metadata hold the flights'
-    names and hashes.
+    names and hashes, and the hashes of `settings.free_air`.
     Raises AirTouchError without TensorFlow, without flights with edges, for unknown changes, and for a recipe of
     another shape than that of `settings.start`.
     """
@@ -54,7 +54,7 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     model = BestModel(recipe, weights, int8, tflite, {
         "detector": "best", "version": __version__, "command": settings.command, "seed": seed, "lag_s": 0.0,
         "sigma_s": detector.TIMING_SIGMA_S, **_decoders(settings.decoder, start),
-        **training_set.of(examples.flights, start), "free_air": len(settings.free_air)})
+        **training_set.of(examples.flights, start, settings.free_air)})
     return with_lag(model, *([settings.lag_of] if settings.lag_of else []), (examples.flights, examples.labels))
 
 

@@ -5,12 +5,17 @@ from dataclasses import dataclass, replace
 
 from airtouch.detector.best.operations import CAUSAL_CONV, HEAD
 from airtouch.detector.best.outputs import OUTPUTS
+from airtouch.detector.shared.pruning import BLOCK
+from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES, MotionConfig
 from airtouch.reference.networks.stream_graph import StreamLayer, receptive_samples
 from airtouch.vehicle import Vehicle
 
 CHANNELS = len(NAMES)  #: values a sample
 ROW_STRIDE = 2  #: samples between two rows that are computed: 50 Hz
+#: field -> its smallest and largest value, of numbers that are whole; a width is a multiple of BLOCK
+LIMITS = {"width": (4, 64), "first_taps": (1, 16), "taps": (1, 8)}
+MOST_DILATIONS, MOST_DILATION = 9, 256  #: layers after the first; rows between the taps of one
 
 
 @dataclass(frozen=True)
@@ -20,6 +25,7 @@ class Recipe:
     Samples are those of a 100 Hz log. A crop is a piece of a flight, one row of a training batch. Width, steps, delay
     and the choice of crops come from 13 trainings over the five folds, the missing sensors and free air from two more
     (host/docs/looks.md, 2026-11-21 and 22); the other numbers have no source.
+    Raises AirTouchError for a shape that the model files and the C kernels do not take.
     """
 
     # Shape
@@ -62,6 +68,19 @@ class Recipe:
     #: its thrust curve, gravity and PWM in the air are those of the motion channels; None for the default vehicle's
     vehicle: Vehicle | None = None
 
+    def __post_init__(self) -> None:
+        for name, (low, high) in LIMITS.items():
+            _check(name, getattr(self, name), low, high)
+        if self.width % BLOCK:
+            raise AirTouchError(f"training: width must be a multiple of {BLOCK}, not {self.width}")
+        _check("the number of dilations", len(self.dilations), 1, MOST_DILATIONS)
+        for dilation in self.dilations:
+            _check("a dilation", dilation, 1, MOST_DILATION)
+        for channel in self.muted:
+            _check("a muted channel", channel, 0, CHANNELS - 1)
+        if not 0.0 <= self.sparsity < 1.0:
+            raise AirTouchError(f"training: sparsity must lie in 0..1, below 1, not {self.sparsity}")
+
     @property
     def graph(self) -> tuple[StreamLayer, ...]:
         """The network: a strided convolution, dilated ones, and a head that reads a row of each of those."""
@@ -87,3 +106,9 @@ class Recipe:
             config = replace(config, vehicle=self.vehicle, arm_pwm=self.vehicle.arm_pwm)
         scale = tuple(math.inf if i in self.muted else s for i, s in enumerate(config.scale))
         return replace(config, scale=scale)
+
+
+def _check(name: str, value: object, low: int, high: int) -> None:
+    """Raise AirTouchError for anything but a whole number from low to high."""
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise AirTouchError(f"training: {name} must be a whole number from {low} to {high}, not {value!r}")

@@ -9,13 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, mapping
 
 from airtouch.detector import registry
+from airtouch.detector.best import sensor_note
+from airtouch.detector.best.model import BestModel, is_shipped
 from airtouch.detector.evaluation import evaluate
+from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
@@ -36,7 +40,8 @@ ROWS_APART = 4.0  #: most distance between passes over one platform, in median d
 class EdgePoint:
     """A detected edge: time, kind ("entry", "exit", "edge"), position and 1-sigma along the track.
 
-    time_s: of the detection from the log's first sample, with the detector's lag; x_m, y_m: without that lag.
+    time_s: of the detection from the log's first sample, with the detector's lag; x_m, y_m: without that lag. Position
+    and sigma are NaN where the track has none.
     """
 
     sample: int
@@ -45,6 +50,11 @@ class EdgePoint:
     x_m: float
     y_m: float
     sigma_m: float
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the track had a position at this edge."""
+        return bool(np.isfinite(self.sigma_m))
 
 
 @dataclass(frozen=True)
@@ -65,7 +75,8 @@ class Platform:
 class EdgeMap:
     """The edges of one flight in the plane, m.
 
-    xy: track (n, 2). points: edges along it. position: source of the positions. lag_s, sigma_s: of the detections.
+    xy: track (n, 2). points: edges along it that have a position. position: source of the positions. lag_s, sigma_s: of
+    the detections. without_position: number of edges that have no position.
     """
 
     xy: np.ndarray
@@ -74,6 +85,7 @@ class EdgeMap:
     position: str
     lag_s: float
     sigma_s: float
+    without_position: int = 0
 
 
 @dataclass(frozen=True)
@@ -91,15 +103,26 @@ def true_edges_of(log: FlightLog) -> TimedEdges:
 
 
 def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = None) -> TimedEdges:
-    """The edges that a detector reports, with the shipped model for None.
+    """The edges that a detector reports, with the shipped model for None; their timing error is assumed for most.
 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
     """
     module = registry.get(detector)
     evaluate.check(log, evaluate.spare_of(module))
     trained = registry.model_for(module, module.load(model), log)
-    return TimedEdges(module.run(log, trained).edges, module.lag_s(trained),
-                      getattr(trained, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
+    return TimedEdges(module.run(log, trained).edges, module.lag_s(trained), _sigma_s(trained, log))
+
+
+def _sigma_s(model: Any, log: FlightLog) -> float:
+    """Timing error of the model's detections, s: what it states, or ASSUMED_SIGMA_S.
+
+    Of the shipped `best` without a sensor at least its mean absolute error there, which an rms error is never below.
+    """
+    stated = float(getattr(model, "metadata", {}).get("sigma_s", ASSUMED_SIGMA_S))
+    missing = sensors.missing_sensors(log)
+    if not (missing and isinstance(model, BestModel) and is_shipped(model, missing)):
+        return stated
+    return max(stated, sensor_note.figures()[missing[0]]["mean_abs_error_s"])
 
 
 def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float = 0.0, sigma_s: float = ASSUMED_SIGMA_S,
@@ -116,7 +139,8 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
     points = edge_points(xy, [e.sample for e in edges], [e.kind for e in edges], period_s=period, sigma_s=sigma_s,
                          lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"
-    return EdgeMap(xy, points, platforms(points), position, lag_s, sigma_s)
+    placed = [p for p in points if p.has_position]
+    return EdgeMap(xy, placed, platforms(points), position, lag_s, sigma_s, len(points) - len(placed))
 
 
 def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:
@@ -139,7 +163,7 @@ def edge_points(
     xy: np.ndarray, samples: Sequence[int] | np.ndarray, kinds: list[str], *, period_s: float = SAMPLE_PERIOD_S,
     sigma_s: float = ASSUMED_SIGMA_S, lag_s: float = 0.0,
 ) -> list[EdgePoint]:
-    """Detections as points of the track.
+    """Each detection as a point of the track, without a position where the track misses one within SPEED_S of it.
 
     xy: track, (n, 2), metres, a row each period_s. samples: index of each detection; lag_s, the constant lag of the
     detector, is subtracted. sigma_s: timing error of a detection; sigma_m is its product with the speed at that sample.
@@ -149,22 +173,26 @@ def edge_points(
     for sample, kind in zip(samples, kinds, strict=True):
         at = int(np.clip(round(sample - lag_s / period_s), 0, len(xy) - 1))
         low, high = max(0, at - half), min(len(xy) - 1, at + half)
-        if not np.isfinite(xy[[low, at, high]]).all() or high == low:
-            continue
-        speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
-        x, y = map(float, xy[at])
-        points.append(EdgePoint(int(sample), sample * period_s, kind, x, y, sigma_s * max(speed, MIN_SPEED_MPS)))
+        x, y, sigma_m = np.nan, np.nan, np.nan
+        if np.isfinite(xy[[low, at, high]]).all() and high > low:
+            speed = float(np.hypot(*(xy[high] - xy[low]))) / ((high - low) * period_s)
+            x, y, sigma_m = *map(float, xy[at]), sigma_s * max(speed, MIN_SPEED_MPS)
+        points.append(EdgePoint(int(sample), sample * period_s, kind, x, y, sigma_m))
     return points
 
 
 def passes(points: list[EdgePoint]) -> list[tuple[EdgePoint, EdgePoint]]:
-    """Pairs of an entry and the next exit. An entry without an exit is left out, and an exit without an entry."""
+    """Pairs of an entry and the next exit. An entry without an exit is left out, and an exit without an entry.
+
+    So is a pair with an end that has no position. `points` must hold these too, so that no end of another pass follows.
+    """
     ordered = sorted(points, key=lambda p: p.sample)
-    return [(a, b) for a, b in pairwise(ordered) if a.kind == "entry" and b.kind == "exit"]
+    return [(a, b) for a, b in pairwise(ordered)
+            if a.kind == "entry" and b.kind == "exit" and a.has_position and b.has_position]
 
 
 def platforms(points: list[EdgePoint]) -> list[Platform]:
-    """The platforms of a flight, each with its outline.
+    """The platforms of a flight, each with its outline. points: all edges, also those without a position.
 
     Two passes belong together where they overlap along the direction of flight and lie, across it,
     no further apart than ROWS_APART times the median distance between successive rows. Rows without an edge that were

@@ -17,13 +17,15 @@ from airtouch.detector.shared import sensors, training_set
 from airtouch.detector.shared.channels import ACCELERATIONS, RATES, logged_channels
 from airtouch.detector.trace import Trace
 from airtouch.errors import AirTouchError
-from airtouch.logs.checks.clock import sample_period
+from airtouch.logs.checks.clock import lost_samples, sample_period, true_period
 from airtouch.logs.checks.quality import clock_steps, nothing_logged
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import flies_below
 from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.vehicle import arm_pwm_of
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
+LONG_HOLE_S = 1.0  #: s without a sample, the window of the network, from which a hole gets a remark
 MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
 
 
@@ -97,6 +99,12 @@ def remarks(log: FlightLog) -> list[str]:
     """Warnings of the reader, and faults of the clock, from which a score of the log may suffer, a line each."""
     back = int((clock_steps(log) < 0).sum())
     clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
+    time_s = log["t_s"] if log.has("t_s") else np.empty(0)
+    holes = [g for g in lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S) if g.seconds >= LONG_HOLE_S]
+    if holes and not back:
+        longest = max(holes, key=lambda g: g.seconds)
+        clock.append(f"no sample in {longest.seconds:.2f} s before sample {longest.sample}; rows are taken as if there "
+                     "were no hole")
     return [str(w) for w in log.meta.get("warnings", [])] + clock
 
 
@@ -108,10 +116,10 @@ def remarks_by_flight(noted: Iterable[tuple[FlightScore, list[str]]], scores: Se
 
 
 def truth(log: FlightLog) -> list[logs.Edge] | None:
-    """True edges, None where the log holds no down range."""
+    """True edges by the `arm_pwm` of the log's vehicle, None where the log holds no down range."""
     if not log.has("zrange_m") or not np.isfinite(log["zrange_m"]).any():
         return None
-    return logs.true_edges(log)
+    return logs.true_edges(log, arm_pwm=arm_pwm_of(log.meta))
 
 
 def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model: Any) -> Result:
@@ -123,8 +131,8 @@ def evaluate_flight(file: FlightFile, log: FlightLog, detector: Detector, model:
 def result_of(file: FlightFile, log: FlightLog, trace: Trace, detector: Detector, model: Any) -> Result:
     """The score of a trace that the detector gave with this model."""
     condition = with_flown_speed(file, log).condition
-    score = score_flight(file.path.name, condition, truth(log), sensors.airborne_by(log)[0], trace,
-                         detector.lag_s(model))
+    score = score_flight(file.path.name, condition, truth(log),
+                         sensors.airborne_by(log, arm_pwm_of(log.meta))[0], trace, detector.lag_s(model))
     note = "; ".join(text for text in (score.note, trace.note) if text)
     trained = training_set.contains(getattr(model, "metadata", {}), log)
     return Result(log, trace, replace(score, note=note, in_training=trained, path=str(file.path)))

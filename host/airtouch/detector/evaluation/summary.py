@@ -131,7 +131,8 @@ def by_wind(scores: Sequence[FlightScore]) -> dict[str, dict]:
 def _totals(score: FlightScore) -> dict[str, float]:
     """The numbers of a flight from whose sums over flights `_statistics` makes every figure.
 
-    m, s (and with "entry" or "exit" appended): summed absolute errors in metres and seconds, of n matched edges.
+    m, s (and with "entry" or "exit" appended): summed absolute errors in metres and seconds, of n matched edges. m and
+    hits are NaN where the distance of one is unknown, for want of a speed.
     over_hits of over, beside_hits of beside: airborne samples that are classified correctly, of those over a platform
     and of the others.
     """
@@ -154,7 +155,8 @@ def _totals(score: FlightScore) -> dict[str, float]:
         totals[f"s{name}"] = sum(abs(seconds) for _, seconds in some)
         totals[f"m{name}"] = sum(abs(e.error_m) if e.error_m is not None else np.nan for e, _ in some)
     for radius in HIT_RADII_M:
-        totals[f"hit_{radius:.2f}"] = sum(e.error_m is not None and abs(e.error_m) <= radius for e, _ in matched)
+        totals[f"hit_{radius:.2f}"] = sum(abs(e.error_m) <= radius if e.error_m is not None else np.nan
+                                          for e, _ in matched)
     for name, value in zip(("over_hits", "over", "beside_hits", "beside"), score.windows, strict=True):
         totals[name] = value
     for index, value in enumerate(score.bins.ravel()):

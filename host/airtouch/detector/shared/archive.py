@@ -82,7 +82,7 @@ def check_metadata(metadata: Mapping[str, Any], source: str) -> None:
     for key, low in (("lag_s", -MOST_S), ("sigma_s", 0.0)):
         if key in metadata:
             _check_number(metadata[key], key, source, low, MOST_S)
-    for key in ("flights", "flight_hashes", "held_out", "held_out_hashes"):
+    for key in ("flights", "flight_hashes", "free_air_hashes", "held_out", "held_out_hashes"):
         names = metadata.get(key, [])
         if not (isinstance(names, list) and all(isinstance(name, str) for name in names)):
             raise AirTouchError(f"{source}: {key} is not a list of texts; {REMEDY}")

@@ -92,14 +92,14 @@ def without(log: FlightLog, sensors: tuple[str, ...]) -> FlightLog:
     return FlightLog({name: values for name, values in log.columns.items() if name not in dropped}, log.meta)
 
 
-def airborne_by(log: FlightLog) -> tuple[np.ndarray, str]:
+def airborne_by(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> tuple[np.ndarray, str]:
     """True where the drone is in the air, (n,) bool, and what says so, for messages.
 
-    By the motors, else by the down range or the height (`logs.airborne`), else by the rates (`is_flying`). Raises
-    AirTouchError, naming columns, for a log without any of them.
+    By the motors, else by the down range or the height (`logs.airborne`), else by the rates (`is_flying`).
+    arm_pwm: as of `airborne`. Raises AirTouchError, naming columns, for a log without any of them.
     """
     if log.has(*PWM):
-        return airborne(log), f"mean PWM above {DEFAULT.arm_pwm:g}"
+        return airborne(log, arm_pwm), f"mean PWM above {arm_pwm:g}"
     heights = [name for name in ("zrange_m", "z_m") if log.has(name) and np.isfinite(log[name]).any()]
     if heights or not log.has(*GYRO):
         return airborne(log), f"a down range or height above {AIRBORNE_RANGE_M:g} m"

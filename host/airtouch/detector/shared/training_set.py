@@ -10,12 +10,17 @@ from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 DIGITS = 16  #: hexadecimal digits of a flight's hash: 64 bits
 
 
-def of(flights: Sequence[FlightLog], start: Any = None) -> dict[str, Any]:
-    """Metadata of a model: names and hashes of its training flights, after those of the model it started from."""
+def of(flights: Sequence[FlightLog], start: Any = None, free_air: Sequence[FlightLog] = ()) -> dict[str, Any]:
+    """Metadata of a model: names and hashes of its training flights, after those of the model it started from.
+
+    free_air: flights without edges that it learns silence from; `free_air` is their number without those of `start`.
+    """
     before = start.metadata if start is not None else {}
     return {"flights_before": len(before.get("flights", ())),
             "flights": [*before.get("flights", ()), *(os.path.basename(log.source) for log in flights)],
-            "flight_hashes": [*before.get("flight_hashes", ()), *(flight_hash(log) for log in flights)]}
+            "flight_hashes": [*before.get("flight_hashes", ()), *(flight_hash(log) for log in flights)],
+            "free_air": len(free_air),
+            "free_air_hashes": [*before.get("free_air_hashes", ()), *(flight_hash(log) for log in free_air)]}
 
 
 def flight_hash(log: FlightLog) -> str:
@@ -34,9 +39,10 @@ def flight_hash(log: FlightLog) -> str:
 def contains(metadata: Mapping[str, Any], log: FlightLog) -> bool:
     """Whether a model with this metadata was trained on the flight: by hash; by name where a model has no hashes.
 
+    Flights in free air count too. Models of before 2026-11-27, the shipped ones among them, do not say which they were.
     A flight is not recognised from a log that holds more or fewer of rates and motors than the one trained on.
     """
-    hashes = metadata.get("flight_hashes")
-    if isinstance(hashes, list) and hashes:
-        return flight_hash(log) in hashes
-    return os.path.basename(log.source) in metadata.get("flights", ())
+    hashes, free_air = metadata.get("flight_hashes") or [], metadata.get("free_air_hashes") or []
+    if (hashes or free_air) and flight_hash(log) in {*hashes, *free_air}:
+        return True
+    return not hashes and os.path.basename(log.source) in metadata.get("flights", ())

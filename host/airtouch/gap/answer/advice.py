@@ -21,26 +21,33 @@ URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 
 
-def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle) -> tuple[NextStep, ...]:
+def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, extrapolated: bool = False,
+               ) -> tuple[NextStep, ...]:
     """The steps to take next, most useful first.
 
-    answer: complete but for these steps; flights: those that were diagnosed; vehicle: as declared.
+    answer: complete but for these steps; flights: those that were diagnosed; vehicle: as declared; extrapolated:
+    whether some were flown unlike the baseline, so that their floor is extrapolated.
     """
     argument = argument_of(vehicle)
-    steps = [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
-    if answer.verdict == "unknown":
-        steps += _steps_for_open_gap(answer.headline, argument)
-    if answer.verdict == "effect":
-        names = " and ".join(dict.fromkeys(e.name for e in answer.effects))
-        steps.append(NextStep(
-            f"Switch on {names} with these parameters in the simulator, and fly it again.",
-            simulate_command(answer.effects, argument)))
-    if answer.verdict == "none":
-        steps.append(NextStep("Nothing to add; longer flights would lower the floor."))
+    steps = []
     if not answer.baseline:
         steps.append(NextStep(
             "Give flights that are known to be nominal with --baseline: they lower the floor and show delays and gains "
             "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
+    steps += [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
+    if answer.verdict == "unknown":
+        steps += _steps_for_open_gap(answer.headline, argument)
+    if answer.verdict == "effect":
+        names = " and ".join(dict.fromkeys(e.name for e in answer.effects))
+        always = " There it acts for the whole flight, not in its seconds alone."
+        steps.append(NextStep(
+            f"Switch on {names} with these parameters in the simulator, and fly it again."
+            + always * any(e.seconds for e in answer.effects),
+            simulate_command(answer.effects, argument)))
+    if answer.verdict == "none":
+        steps.append(NextStep(
+            "Fly the baseline like the test: the floor is extrapolated to the test, and may hide an effect."
+            if extrapolated else "Nothing to add; longer flights would lower the floor."))
     if any(f.rates is None for f in flights):
         steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
     return tuple(steps)

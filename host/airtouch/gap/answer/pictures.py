@@ -152,10 +152,11 @@ def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarra
     """Values (n,) in the bands that end at a frequency or below it, NaN where nothing is judged."""
     out, bands = np.full(len(values), np.nan), sum(end <= highest_hz for _, end in MAP_BANDS_HZ)
     for start, stop in stretches(flight):
-        here = values[start:stop]
+        valid = ~flight.bridged[start:stop]
+        here = interpolate_over(values[start:stop, None], valid)
         if bands < len(MAP_BANDS_HZ):
-            here = low_passed(np.nan_to_num(here[:, None]), bands)[:, 0]
-        out[start:stop] = here
+            here = low_passed(here, bands)
+        out[start:stop] = np.where(valid, here[:, 0], np.nan)
     return out
 
 

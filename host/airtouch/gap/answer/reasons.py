@@ -65,7 +65,12 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     if hypothesis.name in withdrawn:
         others = [name for name in withdrawn if name != hypothesis.name]
         beside = f" together with {joined(others)}" if others else ""
-        return f"closes {max(shrink, 0.0):.0%} of the gap{beside}, too little to be its cause"
+        return (f"closes {max(shrink, 0.0):.0%} of the gap{beside} where the cells in which it gains count as well, "
+                "too little to be its cause")
+    if withdrawn:
+        one = "s" * (len(withdrawn) == 1)
+        return (f"gains {hypothesis.gain:.0f} nats, but {joined(list(withdrawn))} explain{one} the flights better, and "
+                f"close{one} too little of the gap")
     if selection.named_hypothesis:
         names = [s.name for s in selection.named_steps]
         return (f"gains {hypothesis.gain:.0f} nats, while {joined(names)} gain{'s' * (len(names) == 1)} "

@@ -12,6 +12,7 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, short
 
+MOTOR_NOISE = "motor_noise"  #: what recorded flights are often called without a baseline (host/docs/gap.md)
 LEAST_PROBABILITY = 0.0005  #: of the nearest effect, to be named: a smaller one would be shown as 0.0 %
 
 
@@ -61,12 +62,20 @@ def _which(diagnosis: Diagnosis) -> str:
     first, *others = (_named(e) for e in diagnosis.effects)
     cell, they = diagnosis.headline, "they do" if others else "it does"
     beside = f", with {joined(others)} beside it" if others else ""
+    caveat = _without_baseline(diagnosis)
     cause = f"Its cause is {first} (probability {probability}){beside}"
     if cell is None or not summary.stands_out(cell):
-        return f"{cause}: so say all cells together."
+        return f"{cause}: so say all cells together.{caveat}"
     if cell.after is not None and not summary.shrinks(cell):
-        return f"{cause}: so say all cells together, though {they} not shrink this one, nor halve any other."
-    return f"{cause}."
+        return f"{cause}: so say all cells together, though {they} not shrink this one, nor halve any other.{caveat}"
+    return f"{cause}.{caveat}"
+
+
+def _without_baseline(diagnosis: Diagnosis) -> str:
+    """The caveat of noise that is named without a baseline, "" where there is none to make."""
+    noise = [name_in_words(e.name) for e in diagnosis.effects if e.name == MOTOR_NOISE]
+    return (f" Without --baseline that is no sure answer: a recorded flight is then often called {noise[0]}."
+            if noise and not diagnosis.baseline else "")
 
 
 def _named(effect: NamedEffect) -> str:
@@ -83,13 +92,13 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return "How far it would close is not known."
     if diagnosis.verdict == "none":
         if short(before) == "1":
-            return "Over all it is at the floor, so there is nothing to close."
-        return f"Over all it is {short(before)} times the floor; nominal flights may differ by as much."
+            return "The gap over all cells is at the floor, so there is nothing to close."
+        return f"The gap over all cells is {short(before)} times the floor; nominal flights may differ by as much."
     if diagnosis.verdict == "unknown" and before <= 1.0:
         return ("Over all the gap is at the floor: what acts, acts in some seconds only." if unsteady_cell(diagnosis)
                 else "Over all the gap is at the floor, but the signals do not fit a flight without an effect.")
     if diagnosis.verdict != "effect" or diagnosis.shrink is None:
-        return f"Nothing closes it yet: over all it stays {short(before)} times the floor."
+        return f"Nothing closes it yet: the gap over all cells stays {short(before)} times the floor."
     added, they = ("it", "it was") if len(diagnosis.effects) == 1 else ("them", "they were")
     data = f"that {they} fitted to" if diagnosis.judged_on == FITTED else "held out"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "

@@ -7,7 +7,7 @@ import numpy as np
 from airtouch.gap.answer.followed_signals import followed_signals
 from airtouch.gap.answer.reasons import nearest
 from airtouch.gap.flights.flight import PERIOD_S, Flight
-from airtouch.gap.flights.missing import interpolate_missing
+from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import unsteadiness_ratio
 from airtouch.gap.passing.bursts import SHAKE_BAND_HZ, SHAKE_PIECE_S
@@ -18,8 +18,9 @@ from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_sp
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
+from airtouch.gap.where.band_sums import runs_of_phases, stretches
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered, gains
 from airtouch.logs.segments import KINDS
 
 MOST_CELLS = 5  #: cells that are reported at most; chosen, as many as a reader can take in
@@ -28,6 +29,8 @@ MOST_CELLS = 5  #: cells that are reported at most; chosen, as many as a reader 
 def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, cells: Sequence[Cell],
                 ) -> list[OpenCell]:
     """What stays open: cells of the map, each with the flight and the seconds of its phase in which most is left.
+
+    A phase too short for a block of spectra has one of its own runs instead (`_runs_in_phase`), and no signals.
 
     Where the flights are less steady than nominal ones, what shakes most comes before them (`_unsteady_cell`). cells:
     the headline, then the others, those with the largest gap before any effect first. Of these the first
@@ -47,15 +50,19 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
         out.append(_unsteady_cell(study, flights, COLUMNS[selection.unsteadiness_rarity.rarest], near))
     for cell in chosen:
         ratios = _in_phase([(f, ratios_of_blocks(f, residual, cell)) for f, residual in residuals], cell.phase)
-        if not ratios:
+        runs = [] if ratios else [(f, *run) for f, residual in residuals for run in _runs_in_phase(f, residual, cell)]
+        if ratios:
+            flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
+            begin = starts(flight, AIR)
+            first, last = worst_interval(ratio, begin)
+            start, stop, over_floor = begin[first], begin[last] + LENGTH[AIR], ratio[first:last + 1].max()
+        elif runs:
+            flight, start, stop, over_floor = max(runs, key=lambda run: run[3])
+        else:
             continue
-        flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
-        begin = starts(flight, AIR)
-        first, last = worst_interval(ratio, begin)
         out.append(OpenCell(
-            cell.channel, cell.band_hz, cell.phase, flight.name, from_s=float(begin[first] * PERIOD_S),
-            to_s=float((begin[last] + LENGTH[AIR]) * PERIOD_S), over_floor=float(ratio[first:last + 1].max()),
-            follows=tuple(followed_signals(study, ratios)), nearest=near))
+            cell.channel, cell.band_hz, cell.phase, flight.name, float(start * PERIOD_S), float(stop * PERIOD_S),
+            float(over_floor), follows=tuple(followed_signals(study, ratios)) if ratios else (), nearest=near))
     return out
 
 
@@ -77,12 +84,14 @@ def _unsteady_cell(study: Study, flights: Sequence[Flight], columns: Sequence[in
 def ratios_of_blocks(flight: Flight, residual: np.ndarray, cell: Cell) -> np.ndarray:
     """Rms of a cell's channel and band over the cell's floor, in each block (blocks,) in the air.
 
-    residual (n, COUNT): of the flight. NaN where the log lacks the channel.
+    residual (n, COUNT): of the flight; straight lines stand for rows that are not judged. NaN where the log lacks the
+    channel.
     """
     begin, c, f = starts(flight, AIR), COLUMN[cell.channel], frequencies(AIR)
     if not len(begin) or not np.isfinite(residual[:, c]).any():
         return np.full(len(begin), np.nan)
-    density = np.abs(short_time_spectra(interpolate_missing(residual[:, c:c + 1]), begin, AIR)[:, :, 0]) ** 2
+    judged = interpolate_over(residual[:, c:c + 1], ~flight.bridged)
+    density = np.abs(short_time_spectra(judged, begin, AIR)[:, :, 0]) ** 2
     gain = gains(f)[MAP_BANDS_HZ.index(cell.band_hz)]
     return np.sqrt(density @ gain ** 2 * f[1]) / max(cell.floor, summary.SMALLEST_FLOOR)
 
@@ -90,12 +99,29 @@ def ratios_of_blocks(flight: Flight, residual: np.ndarray, cell: Cell) -> np.nda
 def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[tuple[Flight, np.ndarray]]:
     """Flights with their ratios (blocks,), NaN in blocks of which most is another phase.
 
-    Where no block of any flight is mostly of the phase, all count. Flights without a number are left out.
+    Flights without a number are left out.
     """
     place = KINDS.index(phase)
     within = [(f, np.where(_commonest_phase(f) == place, ratio, np.nan)) for f, ratio in ratios]
-    return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()] \
-        or [(f, ratio) for f, ratio in ratios if np.isfinite(ratio).any()]
+    return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()]
+
+
+def _runs_in_phase(flight: Flight, residual: np.ndarray, cell: Cell) -> list[tuple[int, int, float]]:
+    """First sample, the one after the last, and rms over the floor of each run of a cell's phase, cut as in the map.
+
+    residual (n, COUNT): of the flight. No run where the log lacks the channel, or where no row is judged.
+    """
+    c, place, out = COLUMN[cell.channel], KINDS.index(cell.phase), []
+    for start, stop in stretches(flight):
+        valid = ~flight.bridged[start:stop]
+        values = interpolate_over(residual[start:stop, c:c + 1], valid)
+        band = filtered(values)[MAP_BANDS_HZ.index(cell.band_hz), :, 0]
+        for first, last in runs_of_phases(flight.phase[start:stop]):
+            judged = band[first:last][valid[first:last]]
+            if flight.phase[start + first] == place and len(judged) and np.isfinite(judged).all():
+                rms = float(np.sqrt(np.mean(judged ** 2)))
+                out.append((start + first, start + last, rms / max(cell.floor, summary.SMALLEST_FLOOR)))
+    return out
 
 
 def _commonest_phase(flight: Flight) -> np.ndarray:

@@ -1,7 +1,6 @@
 """Parts of a diagnosis in words: numbers, effects, what stays open, candidates that are shown."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
@@ -53,17 +52,8 @@ def seconds_in_words(effect: NamedEffect) -> str:
 
 
 def all_open_in_words(cells: Sequence[OpenCell]) -> list[str]:
-    """One line for each place where the gap stays open. Cells that differ in the phase alone share a line."""
-    groups: dict[tuple, list[OpenCell]] = {}
-    for cell in cells:
-        groups.setdefault(_without_phase(cell), []).append(cell)
-    return [open_in_words(replace(group[0], phase=joined([c.phase for c in group]))) for group in groups.values()]
-
-
-def _without_phase(cell: OpenCell) -> tuple:
-    """What `open_in_words` shows of a cell beside its phase, with numbers to the digit that it shows."""
-    numbers = (round(x, DECIMALS) for x in (cell.over_floor, cell.from_s, cell.to_s))
-    return cell.channel, cell.band_hz, cell.flight, cell.floor, cell.follows, *numbers
+    """One line for each place where the gap stays open."""
+    return [open_in_words(cell) for cell in cells]
 
 
 def open_in_words(cell: OpenCell) -> str:

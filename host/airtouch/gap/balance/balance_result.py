@@ -12,7 +12,7 @@ from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
-from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern
+from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
 from airtouch.gap.balance.hover_posterior import (
     HIGH,
     LOW,
@@ -25,10 +25,11 @@ from airtouch.gap.balance.hover_posterior import (
     probabilities,
     quantile,
 )
-from airtouch.gap.flights.fitness import cannot_of
+from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
+from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.vehicle import Vehicle
@@ -41,6 +42,8 @@ LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
            "it is; candidates that leave both as they are were not tried")
+NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
+              "effect named for that")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 
 
@@ -81,7 +84,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(probability_of, first, closures) if verdict == "effect" else None,
-        notes=_notes(voltage, notes),
+        notes=_notes(voltage, [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -166,3 +169,10 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, f
 def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
     """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
     return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
+
+
+def _not_logged(flights: Sequence[Flight]) -> list[str]:
+    """A note on each flight of whose hovers more than MOST_LOST was not logged, as of a block's samples elsewhere."""
+    shares = [share_not_logged(f) for f in flights]
+    return notes_of([(f.name, [NOT_LOGGED.format(s)] if s > MOST_LOST else [])
+                     for f, s in zip(flights, shares, strict=True)])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, MOST_BRIDGED, PERIOD_S, Flight
 from airtouch.gap.loop.command_spectra import MIX
 from airtouch.logs.flight_log import VELOCITY
 from airtouch.logs.segments import runs
@@ -22,8 +22,9 @@ from airtouch.vehicle import Vehicle
 VOLTAGE_EXPONENT = 1.2
 VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
 SETTLE_S = 0.8  #: s at either end of a stretch in the air that do not count; chosen
-LEAST_S = 4.0  #: s that a hover lasts at least: the spectra need 2.56 s (SPECTRUM_SAMPLES); chosen
+LEAST_S = 4.0  #: s that a hover lasts at least, and that a flight has of hovers without their holes; chosen
 SPECTRUM_SAMPLES = 256  #: of a block of the spectra: bins of 0.4 Hz, three of them in HEAVE_HZ; chosen
+LEAST_SPECTRUM = SPECTRUM_SAMPLES // 2  #: samples of a part beside a hole, at least, whose powers count; chosen
 UNSTEADY_HZ = (2.0, 35.0)  #: band of the commands' unsteadiness; chosen
 UNSTEADY_BANDS = 4  #: parts of UNSTEADY_HZ, equal in octaves, whose log power has the same weight; chosen
 HEAVE_HZ = (0.9, 2.0)  #: band of the vertical acceleration's heave; chosen
@@ -65,7 +66,10 @@ def mean_pattern(patterns: Sequence[HoverPattern]) -> HoverPattern:
 
 
 class _Stretch(NamedTuple):
-    """One hover: mean of the mixed thrust (4,), log10 powers, variance of the corrections along x, y and z (3,)."""
+    """One hover: mean of the mixed thrust (4,), log10 powers, variance of the corrections along x, y and z (3,).
+
+    The powers are NaN where it has fewer than LEAST_SPECTRUM.
+    """
 
     samples: int
     mixed: np.ndarray
@@ -86,28 +90,48 @@ def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) ->
         return NO_HOVER
     samples = [s.samples for s in stretches]
     mean = np.average([s.mixed for s in stretches], axis=0, weights=samples)
-    power = [np.average([s.unsteadiness for s in stretches], weights=samples),
-             np.average([s.heave for s in stretches], weights=samples)]
+    power = [_mean_power([s.unsteadiness for s in stretches], samples),
+             _mean_power([s.heave for s in stretches], samples)]
     x, y, z = np.average([s.corrections for s in stretches], axis=0, weights=samples)
     return HoverPattern(np.array([np.log(mean[0]), *(mean[1:] / mean[0])]), np.array(power),
                         np.log10(np.maximum([x + y, z], 10.0 ** LEAST_POWER)))
 
 
+def _mean_power(log_power: Sequence[float], samples: Sequence[int]) -> float:
+    """Mean of the log10 powers of stretches, weighted by their samples; NaN where none is long enough for one."""
+    known = np.isfinite(log_power)
+    return float(np.average(np.array(log_power)[known], weights=np.array(samples)[known])) if known.any() else np.nan
+
+
 def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
     """What is taken for a hover: first sample, and the one after the last, of each stretch in the air.
 
-    All that is flown is in it, moves and most of a climb as well, but SETTLE_S at either end, and the holes in which
-    accelerations or commands are not measured (`Flight.unmeasured`), at which a stretch is split. The numbers of a
-    pattern are means over that, of a hover only where the flight is one. CrazyPAD's flights are not: in 16 of the 91
-    the phase hover has 10 to 26 % of it, and cruise most of the rest, at 0.2 m/s. So nominal flights must be flown
-    alike.
+    All that is flown is in it, moves and most of a climb as well, but SETTLE_S at either end, and the holes of more
+    than MOST_BRIDGED samples that were not logged, at which a stretch is split: a straight line is steadier than any
+    flight. A stretch has LEAST_S with its holes, and the flight without them; parts may be shorter, as balance and
+    powers are not the same all along a flight. The numbers of a pattern are means over that, of a hover only where the
+    flight is one. CrazyPAD's flights are not: in 16 of the 91 the phase hover has 10 to 26 % of it, and cruise most of
+    the rest, at 0.2 m/s. So nominal flights must be flown alike.
     """
+    logged = np.ones(len(flight), bool)
+    for a, b in runs(flight.not_logged):
+        logged[a:b] = b - a <= MOST_BRIDGED
+    parts = [(a + first, a + last) for a, b in _with_holes(flight) for first, last in runs(logged[a:b])]
+    return parts if sum(b - a for a, b in parts) * PERIOD_S >= LEAST_S else []
+
+
+def share_not_logged(flight: Flight) -> float:
+    """Share of the samples of a flight's hovers, holes included, that were not logged; 0 without a hover."""
+    stretches = [flight.not_logged[a:b] for a, b in _with_holes(flight)]
+    return float(np.concatenate(stretches).mean()) if stretches else 0.0
+
+
+def _with_holes(flight: Flight) -> list[tuple[int, int]]:
+    """First sample, and the one after the last, of each stretch in the air but SETTLE_S at either end."""
     air = (flight.phase != GROUND) & ~flight.on_ground
     trim = int(SETTLE_S / PERIOD_S)
-    settled = np.zeros(len(air), bool)
-    for a, b in runs(air):
-        settled[a + trim:max(b - trim, a + trim)] = True
-    return [(a, b) for a, b in runs(settled & ~flight.unmeasured) if (b - a) * PERIOD_S >= LEAST_S]
+    trimmed = [(a + trim, b - trim) for a, b in runs(air)]
+    return [(a, b) for a, b in trimmed if (b - a) * PERIOD_S >= LEAST_S]
 
 
 def _mixed_thrust(flight: Flight, vehicle: Vehicle, at_one_volt: bool) -> np.ndarray:
@@ -126,14 +150,21 @@ def _stretch(mixed: np.ndarray, upwards: np.ndarray, corrections: np.ndarray) ->
 
     A hover of whose velocity no two rows in succession are known has no correction, as one without velocity.
     """
-    from scipy.signal import welch  # slow to import, and seldom needed
-
-    f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES, axis=0)
-    f, of_heave = welch(upwards, 1.0 / PERIOD_S, nperseg=SPECTRUM_SAMPLES)
-    heave = float(np.log10(of_heave[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
     known = corrections[np.isfinite(corrections).all(axis=1)]
     variance = known.var(axis=0) if len(known) else np.zeros(3)
-    return _Stretch(len(mixed), mixed.mean(axis=0), _unsteadiness(f, of_commands), heave, variance)
+    unsteadiness, heave = _log_powers(mixed, upwards) if len(mixed) >= LEAST_SPECTRUM else (np.nan, np.nan)
+    return _Stretch(len(mixed), mixed.mean(axis=0), unsteadiness, heave, variance)
+
+
+def _log_powers(mixed: np.ndarray, upwards: np.ndarray) -> tuple[float, float]:
+    """Unsteadiness and heave of a hover of LEAST_SPECTRUM samples or more; mixed, upwards: as for `_stretch`."""
+    from scipy.signal import welch  # slow to import, and seldom needed
+
+    block = {"fs": 1.0 / PERIOD_S, "nperseg": min(len(mixed), SPECTRUM_SAMPLES), "nfft": SPECTRUM_SAMPLES}
+    f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), **block, axis=0)
+    f, of_heave = welch(upwards, **block)
+    heave = float(np.log10(of_heave[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
+    return _unsteadiness(f, of_commands), heave
 
 
 def _unsteadiness(f: np.ndarray, power: np.ndarray) -> float:

@@ -61,7 +61,10 @@ def added_response(floor: EdgeFloor, flight: Flight, edge: Edge, active: Sequenc
 
 
 def response_per_step(floor: EdgeFloor, flight: Flight, effect: str, parameter: str) -> dict[str, np.ndarray]:
-    """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds."""
+    """Whitened response (COUNT,) by kind that one natural step of an effect's parameter adds.
+
+    0 for a kind of which no edge was simulated, with the step or without: of it the simulator says nothing.
+    """
     crossing = crossing_of(flight)
 
     def make() -> dict[str, np.ndarray]:
@@ -72,7 +75,8 @@ def response_per_step(floor: EdgeFloor, flight: Flight, effect: str, parameter: 
         stepped = {**neutral, parameter: neutral[parameter] + step}
         base = _simulated_responses(floor, crossing, ())
         with_effect = _simulated_responses(floor, crossing, (Active(term.effect, stepped),))
-        return {k: floor.whiten(with_effect[k] - base[k], flight.log, k) for k in KINDS}
+        return {k: floor.whiten(with_effect[k] - base[k], flight.log, k) if k in base and k in with_effect
+                else np.zeros(COUNT) for k in KINDS}
 
     return floor.workspace.cached("templates", (effect, parameter, crossing, logged(flight.log).tobytes()), make)
 
@@ -109,13 +113,13 @@ def exact_sensors(vehicle: Vehicle) -> Vehicle:
 
 def _simulated_responses(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active],
                          ) -> dict[str, np.ndarray]:
-    """Response (COUNT,) by kind of simulated flights over the same edges, in calm air; cached."""
+    """Response (COUNT,) of simulated flights over the same edges in calm air, by kind as of `_simulate`; cached."""
     key = (crossing, tuple((a.effect.name, tuple(a.values.items())) for a in active))
     return floor.workspace.cached("flown", key, lambda: _simulate(floor, crossing, active))
 
 
 def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active]) -> dict[str, np.ndarray]:
-    """Mean response (COUNT,) by kind of two flights over a platform; 0 for a kind that neither crosses."""
+    """Mean response (COUNT,) of the edges of two flights over a platform, by kind; without a kind that has none."""
     height, clearance, speed, length = crossing
     values = {"length": length, "centre": AHEAD_M + 0.5 * length, "top": max(height - clearance, LEAST_TOP_M),
               "height": height, "way": AHEAD_M + length + STOPPING_S * speed + BEYOND_M, "speed": speed}
@@ -128,4 +132,4 @@ def _simulate(floor: EdgeFloor, crossing: Crossing, active: Sequence[Active]) ->
         for e in true_edges(log, min(PLATFORM_STEP_M, 0.5 * (height - clearance))):
             if BEFORE <= e.sample < len(log) - AFTER:
                 responses[e.kind].append(response(log, floor.vehicle, e.sample))
-    return {k: np.mean(v, axis=0) if v else np.zeros(COUNT) for k, v in responses.items()}
+    return {k: np.mean(v, axis=0) for k, v in responses.items() if v}

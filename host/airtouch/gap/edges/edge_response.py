@@ -73,15 +73,17 @@ class EdgeFloor:
 def edges_of(flight: Flight) -> list[Edge]:
     """Edges with enough flight around them, none where there is no down range.
 
-    Nothing touches the vehicle around them, and at most MOST_BRIDGED of the samples are bridged.
+    Those around which the samples are evidence (`_is_evidence`).
     """
-    def is_evidence(edge: Edge) -> bool:
-        """Whether the samples of the edge's response count."""
-        window = slice(edge.sample - BEFORE, edge.sample + AFTER)
-        bridged = flight.bridged[window]
-        return bool((flight.usable[window] | bridged).all()) and bridged.mean() <= MOST_BRIDGED
+    return flight.workspace.cached("edges", (),
+                                   lambda: [e for e in edges_in_air(flight) if _is_evidence(flight, e.sample)])
 
-    return flight.workspace.cached("edges", (), lambda: [e for e in edges_in_air(flight) if is_evidence(e)])
+
+def _is_evidence(flight: Flight, at: int) -> bool:
+    """Whether nothing touches the vehicle in the samples of a response, of which at most MOST_BRIDGED are bridged."""
+    window = slice(at - BEFORE, at + AFTER)
+    bridged = flight.bridged[window]
+    return bool((flight.usable[window] | bridged).all()) and bridged.mean() <= MOST_BRIDGED
 
 
 def edges_in_air(flight: Flight) -> list[Edge]:
@@ -159,10 +161,10 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
 
 
 def _without_edge(flight: Flight, edges: Sequence[Edge]) -> list[int]:
-    """Samples of level flight that have no edge near them, WINDOW_STEP apart."""
+    """Samples of level flight, WINDOW_STEP apart, whose responses are evidence and share no sample with an edge's."""
     level = np.isin(flight.phase, LEVEL)
     return [at for at in range(BEFORE, len(flight) - AFTER, WINDOW_STEP) if level[at - BEFORE:at + AFTER].all()
-            and not any(-AFTER < e.sample - at < BEFORE + AFTER for e in edges)]
+            and not any(abs(e.sample - at) < BEFORE + AFTER for e in edges) and _is_evidence(flight, at)]
 
 
 def response_covariance(without_edge: np.ndarray, at_edges: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -19,8 +19,8 @@ PERIOD_TOLERANCE = 0.02
 BACKWARDS_S = 0.05  #: step back of the clock that is no jitter: such a log is refused; chosen
 #: most rows with the lost ones, else the clock column is at fault: so many for each logged one, and some more; chosen
 MOST_ROWS_EACH, MOST_ROWS_MORE = 3, 1000
-ALIKE = 0.02  #: share of the median step by which a step may differ from it and count as alike; chosen
-MOST_ALIKE = 0.7  #: share of the steps from which the mean of those alike is the period; chosen
+ALIKE = 0.02  #: share of the median step by which a step may differ from one or more of it; chosen
+MOST_ALIKE = 0.7  #: share of the steps, of one period or more, from which the mean of those of one is it; chosen
 LEAST_JITTER_S = 2e-4  #: s, rms of a clock that nothing disturbs: a jitter below it says nothing; chosen
 MISSING = 1.5  #: step, in periods, from which a row is missing: nearer to two periods than to one
 
@@ -109,9 +109,13 @@ def _rows_in_doubt(time: np.ndarray, period: float) -> int:
 
 
 def _period(time: np.ndarray) -> float:
-    """The clock's period, s: the commonest step where most are alike, however many samples were lost."""
+    """The clock's period, s: the median step where most are one or more of it, however many samples were lost."""
     steps = np.diff(time)
     median = float(np.median(steps)) if len(steps) else 0.0
-    if median > 0.0 and np.mean(np.abs(steps - median) < ALIKE * median) > MOST_ALIKE:
-        return float(steps[np.abs(steps - median) < ALIKE * median].mean())
+    if median > 0.0:
+        with np.errstate(over="ignore"):
+            periods = np.maximum(np.round(steps / median), 1.0)  # more than one where rows were lost
+        alike = np.abs(steps - periods * median) < ALIKE * median
+        if alike.mean() > MOST_ALIKE:
+            return float(steps[alike & (periods == 1.0)].mean())
     return true_period(time) or PERIOD_S

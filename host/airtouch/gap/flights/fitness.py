@@ -9,6 +9,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.logs.checks.channel_faults import stuck_intervals
 from airtouch.logs.checks.clock import LATEST_S
+from airtouch.logs.checks.conventions import wrong_signs, wrong_units
 from airtouch.logs.checks.quality import nothing_logged
 from airtouch.logs.edges import true_edges
 from airtouch.logs.flight_log import ACC, GYRO, PWM, RANGES, FlightLog
@@ -26,7 +27,8 @@ LEAST_GOOD = 0.5  #: share of a column's values that must be possible, else the 
 def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
     """The log without impossible values and columns that hold few others, and notes on what it lacks.
 
-    Raises AirTouchError where nothing was logged, without motor commands or accelerations, and for a single sample.
+    Raises AirTouchError where nothing was logged, without motor commands or accelerations, for a single sample, and for
+    a column in other units than its name says. A rate of the wrong sign is the first note.
     """
     name = log.source
     if nothing_logged(log):
@@ -41,17 +43,19 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
                                 "compares the motor commands with the IMU's measurements")
     if len(log) < 2:
         raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
+    flying = airborne(log)
+    if faults := wrong_units(log, flying):
+        raise AirTouchError(f"{name}: {'; '.join(faults)}")
     notes += [f"{channel} does not change in {share:.0%} of the flight"
-              for channel, share in _stuck_shares(log).items()]
-    return log, tuple(notes)
+              for channel, share in _stuck_shares(log, flying).items()]
+    return log, (*wrong_signs(log, flying), *notes)
 
 
-def _stuck_shares(log: FlightLog) -> dict[str, float]:
-    """Share of the samples in the air in which a channel of the IMU is stuck, by the channels that ever are."""
-    try:
-        flying = airborne(log)
-    except AirTouchError:  # no motors, no height
-        return {}
+def _stuck_shares(log: FlightLog, flying: np.ndarray) -> dict[str, float]:
+    """Share of the samples in the air in which a channel of the IMU is stuck, by the channels that ever are.
+
+    flying: (n,) bool.
+    """
     out: dict[str, float] = {}
     for channel, start, stop in stuck_intervals(log, flying):
         if channel in IMU:

@@ -34,6 +34,9 @@ MOST_BRIDGED = round(LONGEST_BRIDGE_S / PERIOD_S)
 HOLE_NOTE = ("{:.1f} s in the air are no evidence: accelerations, rates or motor commands are missing there for more "
              "than {:g} s at a time; they do not count as lost rows")
 
+GYRO_UNUSED = "the baseline flights have no gyro: that of the flights is not used; log it in both"
+BASELINE_GYRO_UNUSED = "the flights have no gyro: that of the baseline flights is not used; log it in both"
+
 
 @dataclass(frozen=True)
 class Flight:
@@ -180,6 +183,32 @@ def with_gyro_if_any(flights: Sequence[_T], reasons: list[str]) -> list[_T]:
         return list(flights)
     reasons += [f"{f.name}: no gyro, which the other flights have; left out" for f in flights if not f.has_gyro]
     return with_gyro
+
+
+def ready_alike(flights: Sequence[FlightLog], baseline: Sequence[FlightLog], vehicle: Vehicle,
+                of_flights: list[str], of_baseline: list[str]) -> tuple[list[Flight], list[Flight]]:
+    """The flights and those of the baseline made ready, all with a gyro or all without: one floor holds for them.
+
+    Where the flights alone or the baseline alone have one, it is not used. The reasons why some are left out, and the
+    note that a gyro is, are added to `of_flights` and `of_baseline`.
+    """
+    def made(logs: Sequence[FlightLog], reasons: list[str]) -> list[Flight]:
+        """Those that can be used, all with a gyro or all without."""
+        return with_gyro_if_any(list(ready_flights(logs, vehicle, reasons)), reasons)
+
+    nominal, usable = made(baseline, of_baseline), made(flights, of_flights)
+    if nominal and usable and nominal[0].has_gyro != usable[0].has_gyro:
+        if usable[0].has_gyro:
+            of_flights[:] = [GYRO_UNUSED]
+            return made([without_gyro(log) for log in flights], of_flights), nominal
+        of_baseline[:] = [BASELINE_GYRO_UNUSED]
+        return usable, made([without_gyro(log) for log in baseline], of_baseline)
+    return usable, nominal
+
+
+def without_gyro(log: FlightLog) -> FlightLog:
+    """The log without the columns of the gyro."""
+    return FlightLog({k: v for k, v in log.columns.items() if k not in GYRO}, log.meta)
 
 
 def none_usable(reasons: Sequence[str], of_none: str = "no flight that can be used") -> AirTouchError:

@@ -150,7 +150,7 @@ def _ends_s(air: AirBlocks, first: int, last: int) -> tuple[float, float]:
 
 
 def _sharpen(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> Gate:
-    """The gate with each end moved by less and less, as long as the likelihood grows."""
+    """The gate with each end moved by less and less, as long as the likelihood grows and no intervals overlap."""
 
     def log_likelihood(of_gate: Gate) -> float:
         """Log likelihood with the effect in a gate."""
@@ -159,7 +159,7 @@ def _sharpen(data: Data, whole: BlockSet, terms: Sequence[Term], gate: Gate) -> 
     best = log_likelihood(gate)
     for step, i, end, sign in itertools.product(STEPS_S, range(len(gate)), (0, 1), (-1.0, 1.0)):
         moved = _move_end(gate, i, end, sign * step)
-        if moved[i][1] < moved[i][2] and (gain := log_likelihood(moved)) > best:
+        if _is_disjoint(moved) and (gain := log_likelihood(moved)) > best:
             best, gate = gain, moved
     return gate
 
@@ -169,3 +169,9 @@ def _move_end(gate: Gate, i: int, end: int, by_s: float) -> Gate:
     flight, *ends = gate[i]
     ends[end] += by_s
     return (*gate[:i], (flight, ends[0], ends[1]), *gate[i + 1:])
+
+
+def _is_disjoint(gate: Gate) -> bool:
+    """Whether every interval of a gate (in order of flight and time) ends after its begin and before the next one."""
+    return (all(begin < end for _, begin, end in gate)
+            and all(a[0] != b[0] or a[2] <= b[1] for a, b in itertools.pairwise(gate)))

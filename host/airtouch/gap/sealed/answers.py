@@ -14,7 +14,7 @@ Answer = Mapping[str, Any]  #: a diagnosis as JSON
 def read_answers(path: Path) -> list[Answer]:
     """Diagnoses from a folder of JSON files, one each, or a file of many (`diagnose --each --json`).
 
-    Raises AirTouchError for what is none.
+    Raises AirTouchError for what is none or cannot be read.
     """
     path = Path(path)
     files = sorted(path.glob("*.json")) if path.is_dir() else [path]
@@ -23,7 +23,9 @@ def read_answers(path: Path) -> list[Answer]:
         try:
             table = json.loads(file.read_text(encoding="utf-8"))
             out += table["cases"] if "cases" in table else [table]
-        except (OSError, ValueError, TypeError):
+        except OSError as error:
+            raise AirTouchError(f"{file}: cannot be read: {error.strerror}") from None
+        except (ValueError, TypeError):
             raise AirTouchError(f"{file}: not the JSON of a diagnosis; write it with `diagnose --json`") from None
     if not out:
         raise AirTouchError(f"{path}: no diagnosis in it (*.json)")

@@ -92,12 +92,19 @@ def sealed_in(folder: Path) -> dict[str, Any]:
                             "`airtouch gap blind make`") from None
 
 
-def seed_of(folder: Path) -> int | None:
-    """The seed of a set, by the key beside it, of which no more is read; None where there is no such key."""
+def sealed_key(folder: Path, key: Path | None = None) -> bytes:
+    """Content of the key's file, which is the one that was sealed; it is not opened by that.
+
+    key: its path, beside the folder by default. Raises AirTouchError for a key that was changed or cannot be read.
+    """
+    key, sealed = Path(key) if key else key_path(folder), sealed_in(folder)["key_sha256"]
     try:
-        return json.loads(key_path(folder).read_text(encoding="utf-8"))["seed"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+        content = key.read_bytes()
+    except OSError as error:
+        raise AirTouchError(f"{key}: the key cannot be read: {error.strerror}; name it with --key") from None
+    if hashlib.sha256(content).hexdigest() != sealed:
+        raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
+    return content
 
 
 def answers_sha256(cases: Sequence[Mapping[str, Any]]) -> str:
@@ -111,15 +118,8 @@ def open_key(folder: Path, answers: str, key: Path | None = None) -> Key:
     answers: `answers_sha256`; key: its path, beside the folder by default. Raises AirTouchError for a key that was
     changed or cannot be read, and when other answers are already scored: who has seen the key cannot answer blindly.
     """
-    folder, key = Path(folder), Path(key) if key else key_path(Path(folder))
-    sealed = sealed_in(folder)["key_sha256"]
-    try:
-        content = key.read_bytes()
-    except OSError as error:
-        raise AirTouchError(f"{key}: the key cannot be read: {error.strerror}; name it with --key") from None
-    if hashlib.sha256(content).hexdigest() != sealed:
-        raise AirTouchError(f"{key}: not the key that was sealed; its SHA-256 differs from the one in sealed.json")
-    opened = folder / OPENED
+    folder = Path(folder)
+    content, opened = sealed_key(folder, key), folder / OPENED
     if opened.exists():
         try:
             scored = json.loads(opened.read_text(encoding="utf-8"))["answers_sha256"]

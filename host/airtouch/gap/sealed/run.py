@@ -16,7 +16,7 @@ from airtouch.gap.diagnosis import diagnose_with_study
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.sealed import make, score
 from airtouch.gap.sealed.answers import flights_in
-from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in, seed_of
+from airtouch.gap.sealed.key import ANSWERS, SEALED, answers_sha256, open_key, sealed_in, sealed_key
 from airtouch.gap.sealed.make import Say
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.gap.study import Study
@@ -52,21 +52,23 @@ class Answer(NamedTuple):
 
 
 def run(out: Path, flights: int | None = None, seed: int | None = None, *, workers: int = 2, unknown: int | None = None,
-        mapper: Mapper | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
+        mapper: Mapper | None = None, key: Path | None = None, progress: Say = lambda _: None) -> dict[str, Any]:
     """Make the set in `out` (unless it is there), diagnose it, score it: `score.figures`.
 
     flights, seed: of the set, FLIGHTS and SEED by default; AirTouchError is raised where a set that is there has others
     than are given. unknown: how many single flights are diagnosed once more without their effect, all by default.
-    mapper: what stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. Takes about
-    4 s of one core for each flight, once more for each single one.
+    mapper: what stands in for `map` (`on_cluster.mapper`) instead of local processes; the set is made here. key: its
+    path, beside the folder by default; one that cannot be read is told before any flight is diagnosed. How long it
+    takes: host/docs/gap-blind.md, "Run it".
     """
     out = Path(out)
     if not (out / SEALED).exists():
-        make.make(out, FLIGHTS if flights is None else flights, SEED if seed is None else seed, progress=progress)
+        make.make(out, FLIGHTS if flights is None else flights, SEED if seed is None else seed, key=key,
+                  progress=progress)
     answers = out / ANSWERS
     names = flights_in(out)
-    sealed = sealed_in(out)["flights"]
-    for what, asked, there in (("flights", flights, sealed), ("seed", seed, seed_of(out))):
+    sealed, made_with = sealed_in(out)["flights"], json.loads(sealed_key(out, key)).get("seed")
+    for what, asked, there in (("flights", flights, sealed), ("seed", seed, made_with)):
         if None not in (asked, there) and asked != there:
             raise AirTouchError(f"{out}: a sealed set with {what} {there} is there, not {asked}; leave the option out, "
                                 "or choose another folder")
@@ -77,11 +79,11 @@ def run(out: Path, flights: int | None = None, seed: int | None = None, *, worke
     answer(out, answers, [(n, ()) for n in names], workers, progress, study, mapper)
     # the key is opened for these answers; effects can be withheld only when they are known
     first = [json.loads(_place(answers, n, ()).read_text()) for n in names]
-    drawn = open_key(out, answers_sha256(first)).flights
+    drawn = open_key(out, answers_sha256(first), key).flights
     single = [(n, drawn[n].effects[0].name) for n in names if len(drawn[n].effects) == 1]
     cases = [(n, tuple(sorted(group[0])) if (group := names_alike(e)) else (e,)) for n, e in single[:unknown]]
     answer(out, answers, cases, workers, progress, study, mapper)
-    return score.score(out, answers)
+    return score.score(out, answers, key)
 
 
 def answer(folder: Path, answers: Path, cases: Iterable[tuple[str, tuple[str, ...]]], workers: int = 2,

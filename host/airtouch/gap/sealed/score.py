@@ -16,7 +16,8 @@ from airtouch.gap.sealed.key import DrawnEffect, Key, answers_sha256, open_key
 from airtouch.gap.sealed.severity import FACTORS, SEEN
 from airtouch.gap.sealed.variant import has_variants, same_variant
 from airtouch.gap.signatures.alike import interchangeable, same_things
-from airtouch.gap.signatures.candidates import terms
+from airtouch.gap.signatures.term import neutral_of, unit
+from airtouch.simulation.effects import get
 
 SEVERITIES = ("weakest", "2x", "4x")  #: names of the three, in rising order: an effect's `level` in the key
 #: goals of the figures, by their place in `figures` with "/" between keys; host/docs/gap-blind.md has them too
@@ -228,7 +229,8 @@ def shrink(sheet: Sheet) -> dict[str, Any]:
 def parameters(sheet: Sheet) -> dict[str, Any]:
     """Parameters of single effects that are first and named: relative error of each vector, coverage.
 
-    error, in natural steps, and coverage: whatever the rotor, without answers that free no parameter that was drawn.
+    error, in natural steps: of parameters that have a neutral value. coverage: of all that are free, a battery's charge
+    and capacity too. Both whatever the rotor, without answers that free no parameter that was drawn off neutral.
     error_with_variant, coverage_with_variant: of all, where a wrong rotor or loop counts as an error of WRONG_VARIANT
     and as a miss. The n of a coverage counts parameters, by_effect's that of errors.
     """
@@ -260,13 +262,15 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
 def _relative_error(effect: DrawnEffect, known: Mapping[str, Mapping[str, float]]) -> float | None:
     """Distance of answered parameters from the drawn ones over their distance from neutral, in natural steps.
 
-    known: the answered ones, as JSON. None where none of them was drawn off neutral.
+    known: the answered ones, as JSON. Those without a neutral value, such as the charge of a battery or the length of a
+    rope, do not count: a wrong strength would vanish beside them. None where none that counts was drawn off neutral.
     """
-    term = terms(effect.name)[0]
-    size = np.sqrt(sum(((effect.values[k] - term.values[k]) / term.step(k)) ** 2 for k in known))
+    counted = [p for p in get(effect.name).parameters if p.name in known and p.neutral is not None]
+    size = np.sqrt(sum(((effect.values[p.name] - neutral_of(p)) / unit(p)) ** 2 for p in counted))
     if size == 0.0:
         return None
-    return float(np.sqrt(sum(((q["value"] - effect.values[k]) / term.step(k)) ** 2 for k, q in known.items())) / size)
+    off = np.sqrt(sum(((known[p.name]["value"] - effect.values[p.name]) / unit(p)) ** 2 for p in counted))
+    return float(off / size)
 
 
 def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:

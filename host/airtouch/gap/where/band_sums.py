@@ -123,7 +123,7 @@ def _blocks_with_samples(flight: Flight, member: np.ndarray, start: int, stop: i
     member (n, r): which samples of the flight are in which of REGIMES.
     """
     valid = ~flight.bridged[start:stop]
-    for first, last in _blocks(flight.phase[start:stop]):
+    for first, last in runs_of_phases(flight.phase[start:stop]):
         here = slice(first, last)
         mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
         if mask[0].any():
@@ -137,7 +137,7 @@ def stretches(flight: Flight) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
 
 
-def _blocks(phase: np.ndarray) -> list[tuple[int, int]]:
+def runs_of_phases(phase: np.ndarray) -> list[tuple[int, int]]:
     """Runs of one phase cut into equal blocks of about BLOCK samples; short phases are one block."""
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
     blocks = []

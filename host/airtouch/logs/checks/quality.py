@@ -8,10 +8,12 @@ import numpy as np
 from airtouch.errors import AirTouchError, printable
 from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, spikes, stuck_intervals
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
+from airtouch.logs.checks.conventions import wrong_signs, wrong_units
 from airtouch.logs.edges import Edge, true_edges
 from airtouch.logs.flight_log import FlightLog
 from airtouch.logs.in_flight import airborne, flies_below_in_words
 from airtouch.logs.segments import Segment, segments
+from airtouch.parameters import DEFAULT
 
 #: group of channels -> a column of that group
 GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
@@ -50,9 +52,12 @@ class Quality:
         return asdict(self) | {"lost": self.lost}
 
 
-def summary(log: FlightLog) -> dict[str, Any]:
-    """One flight in a row of plain data: format, length, rate, groups of channels, true edges, warnings."""
-    report = check(log)
+def summary(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> dict[str, Any]:
+    """One flight in a row of plain data: format, length, rate, groups of channels, true edges, warnings.
+
+    arm_pwm: as of `check`.
+    """
+    report = check(log, arm_pwm)
     return {
         "source": log.source, "format": report.format, "samples": report.samples,
         "duration_s": report.duration_s, "rate_hz": report.rate_hz,
@@ -63,11 +68,14 @@ def summary(log: FlightLog) -> dict[str, Any]:
     }
 
 
-def check(log: FlightLog) -> Quality:
-    """The quality report of a flight log. A bad log gives warnings, never an exception. The log is not changed."""
+def check(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> Quality:
+    """The quality report of a flight log. A bad log gives warnings, never an exception. The log is not changed.
+
+    arm_pwm: mean PWM above which the vehicle flies.
+    """
     clock, steps = log["t_s"] if log.has("t_s") else np.empty(0), clock_steps(log)
     period = true_period(clock)
-    flying, phases, edges = _flight(log)
+    flying, phases, edges = _flight(log, arm_pwm)
     missing = {name: int((~np.isfinite(v)).sum()) for name, v in log.columns.items()}
     quality = Quality(
         source=log.source, format=str(log.meta.get("format", "")), samples=len(log),
@@ -77,7 +85,7 @@ def check(log: FlightLog) -> Quality:
         missing={name: count for name, count in missing.items() if count},
         duplicated=duplicates(log), stuck=stuck_intervals(log, flying), saturated=saturation_counts(log),
         spikes=spikes(log), segments=phases, edges=edges, warnings=[str(w) for w in log.meta.get("warnings", [])])
-    return replace(quality, warnings=quality.warnings + _faults_in_words(log, quality))
+    return replace(quality, warnings=quality.warnings + _faults_in_words(log, quality, flying, arm_pwm))
 
 
 def clock_steps(log: FlightLog) -> np.ndarray:
@@ -91,11 +99,12 @@ def nothing_logged(log: FlightLog) -> bool:
     return len(log) > 0 and not any(np.isfinite(v).any() for name, v in log.columns.items() if name != "t_s")
 
 
-def _flight(log: FlightLog) -> tuple[np.ndarray, list[Segment], list[Edge]]:
+def _flight(log: FlightLog, arm_pwm: float) -> tuple[np.ndarray, list[Segment], list[Edge]]:
     """Airborne samples (n,) bool, phases and edges. A log without motors and height has none of them."""
     try:
-        flying = airborne(log)
-        return flying, segments(log), true_edges(log) if log.has("zrange_m") else []
+        flying = airborne(log, arm_pwm)
+        edges = true_edges(log, arm_pwm=arm_pwm) if log.has("zrange_m") else []
+        return flying, segments(log, arm_pwm), edges
     except AirTouchError:
         return np.ones(len(log), dtype=bool), [], []
 
@@ -106,11 +115,11 @@ def _duration(clock: np.ndarray, samples: int, period: float) -> float:
     return float(timed[-1] - timed[0]) if len(timed) else max(samples - 1, 0) * period
 
 
-def _faults_in_words(log: FlightLog, quality: Quality) -> list[str]:
-    """One line for each fault of the log."""
-    words = []
+def _faults_in_words(log: FlightLog, quality: Quality, flying: np.ndarray, arm_pwm: float) -> list[str]:
+    """One line for each fault of the log. flying: samples in the air, (n,) bool."""
     if nothing_logged(log):
         return ["nothing was logged: every value of every channel is missing"]
+    words = [*wrong_units(log, flying), *wrong_signs(log, flying)]
     if quality.gaps:
         longest = max(gap.seconds for gap in quality.gaps)
         words.append(f"{quality.lost} samples lost in {len(quality.gaps)} gaps, the longest {longest:.2f} s")
@@ -131,7 +140,7 @@ def _faults_in_words(log: FlightLog, quality: Quality) -> list[str]:
         words.append(f"{name}: {count} samples at the end of its scale")
     for name, at in quality.spikes.items():
         words.append(f"{name}: {len(at)} isolated spikes, first at sample {at[0]}")
-    words += flies_below_in_words(log)
+    words += flies_below_in_words(log, arm_pwm)
     in_air = sum(phase.stop - phase.start for phase in quality.segments if phase.kind != "ground") * sample_period(log)
     if not in_air:
         words.append("no flight in it, or no motors and height to tell")

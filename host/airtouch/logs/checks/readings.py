@@ -42,6 +42,19 @@ def _without(values: np.ndarray, bad: np.ndarray, problem: str, warnings: list[s
     return np.where(bad, np.nan, values)
 
 
+def stated_period_fits(stated: Any, time_s: np.ndarray) -> bool:
+    """Whether a stated sample period, s, is that of the clock (n,) s, by its median step or its median slope.
+
+    Lost samples change the slope alone, and packets that come in bursts the step alone. True for a clock that does
+    not run, and for what is no number.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        periods = [p for p in (_step(time_s[np.isfinite(time_s)]), true_period(time_s)) if p]
+    if isinstance(stated, bool) or not isinstance(stated, (int, float)) or not stated or not periods:
+        return True
+    return any(abs(period / stated - 1.0) <= MOST_CONTRADICTION for period in periods)
+
+
 def _impossible_times(time_s: np.ndarray, source: str) -> np.ndarray:
     """True for times outside the interval of n times 5 s that holds the most times, (n,) bool."""
     with np.errstate(invalid="ignore"):

@@ -9,7 +9,7 @@ from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ACC_WORLD, ATTITUDE, GYRO, PWM, FlightLog
 from airtouch.logs.quaternion import decompress, euler, to_body
 from airtouch.logs.table import Sheet, parse_table
-from airtouch.logs.units import GRAVITY, GYRO_LSB, range_m
+from airtouch.logs.units import GRAVITY, GYRO_LSB, down_range_m, side_range_m
 
 #: columns in a row -> its channels; those of the world frame are in mm/s^2, gravity included
 LAYOUTS = {
@@ -61,9 +61,9 @@ def read(text: Sheet, source: str) -> FlightLog:
         columns |= dict(zip(PWM, raw["pwm"].T, strict=True))
     for kind, name in (("left", "range_left_m"), ("right", "range_right_m")):
         if kind in raw:
-            columns[name] = range_m(raw[kind][:, 0], zero_is_invalid=True)
+            columns[name] = side_range_m(raw[kind][:, 0])
     if "zrange" in raw:
-        columns["zrange_m"] = range_m(raw["zrange"][:, 0])
+        columns["zrange_m"] = down_range_m(raw["zrange"][:, 0])
     return FlightLog(columns, meta)
 
 

@@ -75,18 +75,20 @@ def _check_column(how: Any, place: str) -> None:
 def read(path: str | Path, mapping: str | Path) -> FlightLog:
     """The flight log of a CSV with a header line, by a column map (a TOML file).
 
-    Cells that are no numbers become NaN; a warning counts them. Raises AirTouchError for columns that the CSV lacks.
+    Cells that are no numbers become NaN; a warning counts them, and another the rows that have not as many cells as
+    the header. A last line without a line end is dropped with a warning: its last number may lack digits. Raises
+    AirTouchError for columns that the CSV lacks.
     """
     table = load(mapping)
-    try:
-        rows = list(csv.reader(io.StringIO(load_text(path).decode("utf-8", "replace"))))
-    except csv.Error as error:
-        raise AirTouchError(f"{path}: cannot be read as CSV: {error}") from None
-    rows = [r for r in rows if r and not r[0].startswith("#")]
+    warnings: list[str] = []
+    rows = _rows(path, warnings)
     if len(rows) < 2:
-        raise AirTouchError(f"{path}: no header and rows in it")
+        raise AirTouchError(f"{path}: no header and complete rows in it")
     header = [name.strip() for name in rows[0]]
-    columns, warnings = {}, []
+    ragged = sum(len(row) != len(header) for row in rows[1:])
+    if ragged:
+        warnings.append(f"{ragged} of {len(rows) - 1} rows have not the header's number of cells, {len(header)}")
+    columns = {}
     for name, how in table["columns"].items():
         if how["from"] not in header:
             raise AirTouchError(f"{path}: no column {how['from']!r}{nearest(how['from'], header)} ({mapping}: "
@@ -103,6 +105,19 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
     log = FlightLog({n: columns[n] for n in COLUMNS if n in columns},
                     {"source": str(path), "format": "mapped", "condition": "", "warnings": warnings, **meta})
     return without_impossible_values(log)
+
+
+def _rows(path: str | Path, warnings: list[str]) -> list[list[str]]:
+    """The cells of each complete line of a CSV, without comments and blank lines."""
+    text = load_text(path, warnings).decode("utf-8", "replace")
+    complete, newline, cut = text.rpartition("\n")
+    if cut.strip():
+        warnings.append(f"line {complete.count(chr(10)) + 1 + len(newline)} is cut off and was dropped")
+    try:
+        rows = list(csv.reader(io.StringIO(complete)))
+    except csv.Error as error:
+        raise AirTouchError(f"{path}: cannot be read as CSV: {error}") from None
+    return [row for row in rows if row and not row[0].startswith("#")]
 
 
 def _number(cell: str) -> float:

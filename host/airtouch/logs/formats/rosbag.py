@@ -142,6 +142,12 @@ def _pose(message: Any) -> list[tuple[str, float]]:
     return [*_xyz(POSITION, message.pose.position), *_angles(message.pose.orientation)]
 
 
+def _range(message: Any) -> list[tuple[str, float]]:
+    """The down range; NaN outside of the message's limits, where they are set."""
+    outside = message.max_range > message.min_range and not message.min_range <= message.range <= message.max_range
+    return [("zrange_m", np.nan if outside else float(message.range))]
+
+
 def _motors(message: Any) -> list[tuple[str, float]]:
     values = np.asarray(message.data, float)
     return list(zip(PWM, values.tolist(), strict=True)) if len(values) == 4 else []
@@ -159,5 +165,5 @@ def _pwm(commands: np.ndarray, kind: str) -> tuple[np.ndarray, str]:
 
 
 #: message type -> reader of its columns; of two types with the same column the one that comes first is read
-READERS = {"Odometry": _odometry, "PoseStamped": _pose, "Imu": _imu, "Range": lambda m: [("zrange_m", float(m.range))],
+READERS = {"Odometry": _odometry, "PoseStamped": _pose, "Imu": _imu, "Range": _range,
            "BatteryState": lambda m: [("vbat_V", float(m.voltage))]}

@@ -19,11 +19,11 @@ STAND_COLUMNS = {
 def read_thrust_stand(path: str | Path) -> dict[str, np.ndarray]:
     """The columns of a thrust-stand run, (n,) each: `weight_g`, `pwm`, `vbat_V`, `rpm_1` to `rpm_4`, ...
 
-    Columns that the file lacks are absent. Raises AirTouchError for an unknown header
-    and for rows that are not numbers.
+    Columns that the file lacks are absent. Of a truncated file the complete rows are read, without a warning. Raises
+    AirTouchError for an unknown header and for rows that are not numbers.
     """
     source = str(path)
-    text = sheet(load_text(path))
+    text = sheet(load_text(path, []))
     if not {"pwm", "vbat[V]", "rpm1"} <= set(names_of(text.first)):
         raise AirTouchError(f"{source}:{text.line}: not the header of a thrust-stand run; "
                             "name the columns pwm, vbat[V], rpm1, ...")

@@ -57,15 +57,16 @@ def df_loss(job: Job) -> Figure:
     table = [words.table_row(what, r, epochs_to_converge=epochs[what]) for what, r in rows.items()]
     names = list(LOSSES)
     pairs = list(zip(names[::2], names[1::2], strict=True))  # with the loss, without it
-    gains = {on: 1.0 - (rows[on]["mean_abs_error_m"] or np.nan) / (rows[off]["mean_abs_error_m"] or np.nan)
-             for on, off in pairs}
+    groups = {what: flights for what, (flights, _) in scored.items()}
+    gains = {on: words.gain(rows, groups, on, off) for on, off in pairs}
+    least = HALF * CLAIMS["df-loss"].values[2]
     text = "; ".join(f"{what} {words.metres(r)}, {words.misses(r)}" for what, r in rows.items())
-    helps = words.any_of(words.all_of([words.worse(rows[on], rows[off]),
-                                       bool(gains[on] >= HALF * CLAIMS["df-loss"].values[2])]) for on, off in pairs)
+    helps = words.any_of(words.all_of([words.worse(rows[on], rows[off]), words.gained(gains[on], least, least)])
+                         for on, off in pairs)
     sooner = words.any_of(_sooner(scored[on][1], scored[off][1]) for on, off in pairs)
     verdicts = {
         "df-loss": words.verdict(helps, f"{text}; error less by "
-                                 + " and ".join(f"{100 * g:.0f} %" for g in gains.values())),
+                                 + " and ".join(words.percent(*g) for g in gains.values())),
         "df-epochs": words.verdict(sooner,
                                    "epochs until the held-out loss is within 1 % of its lowest, mean of the folds: "
                                    + ", ".join(f"{what} {e:.1f}" for what, e in epochs.items()))}
@@ -73,7 +74,6 @@ def df_loss(job: Job) -> Figure:
         verdicts["df-epochs"] = Verdict(UNTESTABLE, f"{QUICK_EPOCHS} epochs are too few to see; leave out --quick")
     caption = (f"{_caption(job, rows)} Lambda is 0.1; the paper does not say its own. Dashed: trained on {FEW} "
                "flights, where the paper expects most of it.")
-    groups = {what: flights for what, (flights, _) in scored.items()}
     styles = {what: {"color": pictures.COLOURS["best" if what.startswith("with,") or what == "with the loss"
                                                else "paper"], "ls": "--" if "flights" in what else "-"}
               for what in scored}

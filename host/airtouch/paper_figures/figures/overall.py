@@ -1,9 +1,5 @@
 """Overall errors over platforms, and the method against the paper's baseline (labels Performance:1a and 1c)."""
 
-from typing import Any
-
-import numpy as np
-
 from airtouch.detector.evaluation import summary
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.paper_figures import pictures, recorded, words
@@ -43,13 +39,12 @@ def against_baseline(job: Job) -> Figure:
     ours, theirs, gain = CLAIMS["baseline"].values
     scores = {name: recorded.scores(job, name)[0] for name in ("best", "paper", "baseline")}
     rows = {name: summary.summarise(flights) for name, flights in scores.items()}
-    gains = {name: _gain(rows, scores, name) for name in ("paper", "best")}
+    gains = {name: words.gain(rows, scores, name, "baseline") for name in ("paper", "best")}
     table = [words.table_row(n, r) for n, r in rows.items()]
     text = (f"paper's method {words.score(rows['paper'])}; baseline {words.score(rows['baseline'])}; best "
             f"{words.score(rows['best'])}. Below the baseline's error: "
             + ", ".join(f"{n} {words.percent(*of)}" for n, of in gains.items()))
-    low, high = gains["paper"][1] or (np.nan, np.nan)
-    enough = words.decided(low >= gain - words.SHARE_MARGIN, high < gain)
+    enough = words.gained(gains["paper"], gain - words.SHARE_MARGIN, gain)
     verdict = words.verdict(words.all_of([words.reaches(rows["paper"], ours), enough]), text)
 
     def draw(canvas):
@@ -61,14 +56,3 @@ def against_baseline(job: Job) -> Figure:
     caption = (recorded.sample_sentence(job, rows["best"]["flights"], rows["best"]["edges"])
                + " Platforms only: no recorded flight crosses a material interface, over which the paper averages too.")
     return Figure("Errors of the method and of the baseline", table, caption, {"baseline": verdict}, draw)
-
-
-def _gain(rows: dict[str, Any], scores: dict[str, list[FlightScore]],
-          name: str) -> tuple[float | None, tuple[float, float] | None]:
-    """How much less a detector's error is than the baseline's, as a fraction, with its 95 % interval; None: unknown."""
-    ours, theirs = (rows[n]["mean_abs_error_m"] for n in (name, "baseline"))
-    if ours is None or not theirs:
-        return None, None
-    interval = summary.paired(scores[name], scores["baseline"], lambda first, second: {
-        "gain": 1.0 - first["mean_abs_error_m"] / second["mean_abs_error_m"]})
-    return 1.0 - ours / theirs, interval["gain"]

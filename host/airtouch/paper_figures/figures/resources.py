@@ -78,7 +78,7 @@ def _flops(n: _Counts) -> Verdict:
     vision = n.vision_multiplications
     side = np.sqrt(theirs / FLOPS_A_MAC / (vision / np.prod(PAPER_CAMERA)))
     return words.verdict(
-        _near(n.dense_multiplications, said) and _near(FLOPS_A_MAC * vision, theirs),
+        words.near(n.dense_multiplications, said) and words.near(FLOPS_A_MAC * vision, theirs),
         f"paper's network {n.dense_multiplications / 1e6:.2f} million multiply-accumulates without zeros (the paper's "
         f"0.28 counts these), {n.multiplications / 1e6:.2f} as shipped; TEED at 320 x 320 "
         f"{FLOPS_A_MAC * vision / 1e6:,.0f} million FLOPs, {vision / 1e6:,.0f} million multiply-accumulates; 3900 "
@@ -88,7 +88,7 @@ def _flops(n: _Counts) -> Verdict:
 
 def _parameters(n: _Counts) -> Verdict:
     theirs, said = CLAIMS["parameters"].values
-    return words.verdict(n.shipped_bytes <= said and _near(n.vision_parameters, theirs),
+    return words.verdict(n.shipped_bytes <= said and words.near(n.vision_parameters, theirs),
                          f"{n.shipped_bytes:,} bytes as shipped; TEED has {n.vision_parameters:,} weights and biases: "
                          f"58 kB at one byte each, {4 * n.vision_parameters:,} bytes in float", NETWORKS)
 
@@ -142,7 +142,3 @@ def _dense_multiplications(model: Any) -> int:
             rows, columns, channels = layer.output_shape
             total += int(np.prod(layer.weights.shape)) * (rows * columns if layer.kind == CONV else 1)
     return total
-
-
-def _near(value: float, published: float, share: float = 0.1) -> bool:
-    return abs(value - published) <= share * published

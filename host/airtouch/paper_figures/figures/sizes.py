@@ -35,7 +35,7 @@ def sizes(job: Job) -> Figure:
     before, after = CLAIMS["size"].values
     ours = rows[1]["bytes"]
     verdicts = {
-        "size": words.verdict(abs(FLOAT_BYTES * weights - before) < 0.1 * before and ours <= after,
+        "size": words.verdict(words.near(FLOAT_BYTES * weights, before) and ours <= after,
                               f"{FLOAT_BYTES * weights:,} bytes in float ({weights:,} weights and biases), {ours:,} "
                               f"bytes shipped, {FLOAT_BYTES * weights / ours:.1f} times less"),
         "speed": Verdict(UNTESTABLE, f"no GAP8 here; on this machine float {times['float']:.3f} ms and int8 "

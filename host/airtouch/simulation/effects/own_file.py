@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import sys
+import threading
 import traceback
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from airtouch.logs.files import read_text
 from airtouch.simulation.effects import names
 from airtouch.simulation.effects.effect import Effect, Parameter
 from airtouch.simulation.effects.registry import EFFECTS, LOADED, SOURCE, register
+
+_LOCK = threading.RLock()  #: held from the look whether a text is loaded until it is; a file may load another one
 
 
 def load_file(path: str | Path) -> list[Effect]:
@@ -26,10 +29,16 @@ def load_file(path: str | Path) -> list[Effect]:
 
 
 def load_text(text: str, source: str = "effect file") -> list[Effect]:
-    """Register the effects of Python source; a second time with the same text changes nothing."""
+    """Register the effects of Python source; a second time with the same text, of any thread, changes nothing."""
     key = hash(text)
-    if key in LOADED:
+    with _LOCK:
+        if key not in LOADED:
+            LOADED[key] = [register(e) for e in _defined(text, source)]
         return LOADED[key]
+
+
+def _defined(text: str, source: str) -> list[Effect]:
+    """The effects that Python source defines, not yet registered. Raises AirTouchError that says what is wrong."""
     scope: dict[str, object] = {"__name__": "airtouch_effects"}
     try:
         names.check(text, source)
@@ -45,8 +54,7 @@ def load_text(text: str, source: str = "effect file") -> list[Effect]:
     for name in names_of_file:
         if name in EFFECTS or names_of_file.count(name) > 1:
             raise AirTouchError(f"{source}: an effect named {name!r} is already there; give yours another name")
-    LOADED[key] = [register(e) for e in defined]
-    return LOADED[key]
+    return defined
 
 
 def source_of(name: str) -> str:

@@ -1,7 +1,7 @@
 """The registry: every effect by its name, in the order in which they are applied."""
 
 import importlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from airtouch.errors import AirTouchError, unknown
 from airtouch.simulation.effects.effect import Active, Effect
@@ -46,9 +46,20 @@ def unregister(name: str) -> None:
 
 def get(name: str) -> Effect:
     """The effect of that name; AirTouchError names the known ones."""
+    if not isinstance(name, str):
+        raise AirTouchError(f"an effect is given by its name, not {name!r}")
     if name not in EFFECTS:
         raise unknown("effect", name, EFFECTS)
     return EFFECTS[name]
+
+
+def names_of(without: Iterable[str]) -> tuple[str, ...]:
+    """The names of effects, each a known one. Raises AirTouchError for another, and for a name in place of a list."""
+    if isinstance(without, str):
+        raise AirTouchError(f"without is a list of effects: [{without!r}]")
+    if not isinstance(without, Iterable):
+        raise AirTouchError(f"without is a list of effects, not {without!r}")
+    return tuple(get(name).name for name in without)
 
 
 def activate(chosen: Iterable[Active | tuple[str, Mapping[str, float]]] | Mapping[str, Mapping[str, float]],
@@ -58,11 +69,15 @@ def activate(chosen: Iterable[Active | tuple[str, Mapping[str, float]]] | Mappin
     chosen: {name: {parameter: value}}, or pairs of both where one effect comes twice.
     Raises AirTouchError for unknown names, values out of bounds, and a second one of an effect that can be on once.
     """
+    if isinstance(chosen, str) or not isinstance(chosen, Iterable):
+        raise AirTouchError(f"effects are {{name: {{parameter: value}}}}, or pairs of both, not {chosen!r}")
     if isinstance(chosen, Mapping):
         chosen = list(chosen.items())
     active = []
     for item in chosen:
         if not isinstance(item, Active):
+            if not (isinstance(item, Sequence) and len(item) == 2 and isinstance(item[1], Mapping)):
+                raise AirTouchError(f"an effect is a pair of its name and {{parameter: value}}, not {item!r}")
             effect = get(item[0])
             item = Active(effect, effect.values(item[1]))
         if item.effect.once and any(a.effect.name == item.effect.name for a in active):

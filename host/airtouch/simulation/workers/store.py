@@ -13,23 +13,35 @@ import io
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from airtouch import logs
+from airtouch import __version__, logs
 from airtouch.errors import AirTouchError
 from airtouch.logs import json_lines
 from airtouch.logs.files import MANIFEST, load_bytes, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
-from airtouch.simulation.flight import Diverged
+from airtouch.simulation.firmware import settings
+from airtouch.simulation.flight import Chosen, Diverged
 from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.tables import is_number
+from airtouch.vehicle import Vehicle
 
 REQUEST, FAILED = "run.json", "diverged.jsonl"
 HEAD = "file,use,fold,height,angle_deg,wind,speed_mps"  #: first line of the manifest
 NUMBER = re.compile(r"(\d{6,})\.csv\.gz")  #: end of a flight's file name
 FLIGHT = re.compile(r".+_\d+_" + NUMBER.pattern)  #: a flight's file name
+
+
+def request_of(scenario: Scenario, vehicle: Vehicle, effects: Chosen, without: Sequence[str], seed: int,
+               plugins: Sequence[str] = ()) -> dict[str, Any]:
+    """What the flights of a batch depend on, beside their numbers, JSON-ready. plugins: texts of effect files."""
+    release = settings.load(draw_flight(scenario, seed, 0).with_changes(vehicle).firmware)
+    return {"airtouch": __version__, "firmware_digest": digest(repr(release.tolist())),
+            "scenario": scenario.name, "scenario_digest": digest(repr(scenario.table)),
+            "vehicle": vars(vehicle), "effects": effects, "without": list(without), "seed": seed,
+            "effect_files": [digest(text) for text in plugins]}
 
 
 def open_folder(folder: Path, request: Mapping[str, Any], force: bool = False) -> None:

@@ -20,6 +20,7 @@ from scipy.optimize import lsq_linear
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.robust import deviation
+from airtouch.twin.cache import equations
 from airtouch.twin.fitting import fly
 from airtouch.twin.fitting import levers as lever_set
 from airtouch.twin.fitting.levers import Lever
@@ -136,7 +137,7 @@ def key(target: Target, vehicle: Vehicle, levers: Sequence[Lever], *, flights: i
     So a fit can go on for more rounds. As the last steps are shortened, its result is then not that of as many at once.
     """
     courses = [replace(course, source="") for course in target.courses]
-    text = repr((courses, vehicle, tuple(levers), flights, seed, fixed))
+    text = repr((courses, vehicle, equations(vehicle), tuple(levers), flights, seed, fixed))
     return hashlib.sha256(text.encode() + np.ascontiguousarray(target.features).tobytes()).hexdigest()[:12]
 
 
@@ -269,5 +270,6 @@ def load(path: Path | None, fit_key: str) -> State | None:
     except (ValueError, KeyError, TypeError, AttributeError):
         raise AirTouchError(f"{path}: a damaged fit; remove it or use --force") from None
     if not same:
-        raise AirTouchError(f"{path}: a fit to other flights, or with other settings; --force starts anew")
+        raise AirTouchError(f"{path}: a fit to other flights, with other settings or firmware, or of another version "
+                            "of AirTouch; --force starts anew")
     return state

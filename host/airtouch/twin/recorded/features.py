@@ -11,6 +11,7 @@ import numpy as np
 
 from airtouch.logs.flight_log import PWM, FlightLog
 from airtouch.parameters import SAMPLE_RATE_HZ
+from airtouch.reference.finite import hold_finite
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, channels
 from airtouch.twin.recorded.course import OVER, Course
@@ -104,9 +105,8 @@ def edge_locked(x: np.ndarray, course: Course, edge: int, before: int = AROUND[0
 
 def _trims(log: FlightLog, free: np.ndarray, course: Course) -> np.ndarray:
     """The features of group "trim"."""
-    pwm = log.stack(PWM)[course.free]
-    mean = np.nanmean(pwm, axis=1)
-    slope = np.polyfit(np.arange(len(mean)) / SAMPLE_RATE_HZ, np.nan_to_num(mean, nan=float(np.nanmean(mean))), 1)[0]
+    mean = hold_finite(log.stack(PWM))[0][course.free].mean(axis=1)
+    slope = np.polyfit(np.arange(len(mean)) / SAMPLE_RATE_HZ, mean, 1)[0]
     return np.r_[mean.mean(), slope, 100.0 * course.before_m, np.median(free[:, [ch.ROLL, ch.PITCH, ch.YAW]], axis=0)]
 
 
