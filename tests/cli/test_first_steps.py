@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from airtouch import logs, vehicle
-from airtouch.cli import airtouch
+from airtouch.cli import COMMANDS, MEANT, airtouch
 from airtouch.cli.gap.files import files_of
 from airtouch.crazyflie import manifest, mission
 from airtouch.crazyflie.view import board
@@ -33,6 +33,15 @@ def run(*arguments):
 def test_a_mistyped_command_gets_the_nearest(typed, nearest):
     result = run(*typed)
     assert result.exit_code == 2 and f"No such command '{typed[-1]}'; did you mean {nearest}" in result.output
+
+
+def test_a_word_for_a_command_gets_the_commands_that_do_it():
+    result = run("detect", "flight.csv")
+    assert result.exit_code == 2 and "No such command 'detect'; did you mean map or evaluate?" in result.output
+    for word, commands in MEANT.items():
+        assert word not in COMMANDS
+        for command in commands:
+            assert run(*command.split(), "--help").exit_code == 0
 
 
 def test_a_mistyped_mission_gets_the_nearest():

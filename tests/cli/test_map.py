@@ -46,6 +46,13 @@ def test_a_zigzag_gives_the_platform_and_a_picture(tmp_path):
     assert repeat.exit_code != 0 and "--force" in str(repeat.exception)
 
 
+def test_a_flight_without_an_edge_says_so(tmp_path):
+    level = zigzag_log()
+    logs.write(level.with_columns({"zrange_m": np.full(len(level), 0.8)}), tmp_path / "level.csv")
+    result = run(tmp_path / "level.csv", "--truth", "--out", tmp_path / "map.geojson")
+    assert result.exit_code == 0 and result.output.splitlines()[-2] == "no edges found in the down range"
+
+
 def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path):
     """Both have a file: written to one name, the picture would replace the GeoJSON without a word."""
     logs.write(zigzag_log(), tmp_path / "zigzag.csv")

@@ -45,9 +45,19 @@ def test_every_figure_of_every_summary_is_printed(width, count):
 
 
 def test_the_caption_explains_columns_that_are_there():
-    explained = re.findall(r"(?:^|\. )([^.:]+(?:\.\d+ m)?): ", output.CAPTION)
+    explained = re.findall(r"(?:^|\. )([^.:]+(?:\.\d+ m)?): ", output.INTERVALS + output.CAPTION)
     assert explained[0] == "second line" and len(explained) == 4
     assert set(explained[1:]) <= set(COLUMNS)
+
+
+@pytest.mark.parametrize("width", [80, 170])
+def test_the_caption_speaks_of_a_second_line_only_where_there_is_one(width):
+    """As of one flight, from which no interval is known."""
+    one, several = summary(0.5), summary(0.25)
+    one["intervals"] = {**dict.fromkeys(one["intervals"]), "hit": dict.fromkeys(one["hit"])}
+    for rows, has in (({"one": one}, False), ({"one": one, "several": several}, True)):
+        text = printed(width, lambda screen, rows=rows: output.print_table(screen, rows, "a title"))
+        assert ("second line" in text) is has and "missed: no detection" in text
 
 
 @pytest.fixture(scope="module")

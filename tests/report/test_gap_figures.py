@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -45,6 +46,25 @@ def test_signal_has_measured_and_models_above_and_their_differences_below(drawn)
     assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
     assert "floor" in below.get_legend_handles_labels()[1]
     assert above.get_ylabel() == "forward force\nm/s²" and below.get_xlabel() == "time, s"
+
+
+def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):
+    """It is broader, and drawn first."""
+    equal = replace(signal(), after=np.full(100, 2.0))
+    for ax, before, after in zip(drawn(gap_figures.signals, equal).axes, ("model", "gap before"),
+                                 ("model with effect", "gap after"), strict=True):
+        drawn_lines = {line.get_label(): (i, line.get_linewidth()) for i, line in enumerate(ax.get_lines())}
+        assert drawn_lines[before][0] < drawn_lines[after][0]
+        assert drawn_lines[before][1] >= 2.0 * drawn_lines[after][1]
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_height_is_below_the_signal_of_a_ground_effect(drawn, measured):
+    figure = drawn(gap_figures.signals, replace(signal(measured), height_m=np.full(100, 0.08)))
+    *_, gap, height = figure.axes
+    assert len(figure.axes) == 2 + measured and set(lines(gap)) == {"gap before", "gap after"}
+    assert {y[0] for y in lines(height).values()} == {0.08}
+    assert (height.get_ylabel(), height.get_xlabel(), gap.get_xlabel()) == ("height\nm", "time, s", "")
 
 
 def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):

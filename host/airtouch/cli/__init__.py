@@ -3,6 +3,7 @@
 import importlib
 import io
 import sys
+from collections.abc import Mapping, Sequence
 
 import click
 
@@ -39,16 +40,28 @@ SECTIONS = {
         "flash": ("drone.flash", "Check a firmware image and flash it."),
     },
 }
+#: words that a user may try -> commands that do it
+MEANT = {"detect": ("map", "evaluate"), "score": ("evaluate",), "plot": ("map",), "fly": ("collect", "simulate"),
+         "info": ("logs info",), "convert": ("logs convert",), "check": ("logs check",), "fetch": ("dataset fetch",),
+         "diagnose": ("gap diagnose",), "measure": ("gap measure",)}
 COMMANDS = {name: command for section in SECTIONS.values() for name, command in section.items()}
 
 
 class Suggesting(click.Group):
-    """A group of commands: it says in a whole line what each does, and suggests similar names for an unknown one."""
+    """A group of commands: it says in a whole line what each does, and suggests others for an unknown one.
+
+    meant: commands that a word stands for; of any other word those with a similar name are suggested.
+    """
+
+    meant: Mapping[str, Sequence[str]] = {}
 
     def resolve_command(self, ctx: click.Context,
                         args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
-            ctx.fail(f"No such command {args[0]!r}{nearest(args[0], self.list_commands(ctx)) or '.'}")
+            meant = self.meant.get(args[0])
+            suggested = (f"; did you mean {' or '.join(meant)}?" if meant
+                         else nearest(args[0], self.list_commands(ctx)) or ".")
+            ctx.fail(f"No such command {args[0]!r}{suggested}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -60,6 +73,8 @@ class Suggesting(click.Group):
 
 class LazyGroup(Suggesting):
     """A group that imports a command's module when the command is called."""
+
+    meant = MEANT
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)

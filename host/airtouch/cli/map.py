@@ -25,7 +25,8 @@ from airtouch.logs.formats.rosbag import is_bag
 @click.option("--heading", type=Finite(), default=0.0, metavar="DEG", help="Heading of that dead reckoning.")
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; that of the model, or 0.1 s, if left out.")
-@click.option("--out", type=click.Path(path_type=Path), help="GeoJSON to write; the plot goes beside it as .png.")
+@click.option("--out", type=click.Path(path_type=Path),
+              help="GeoJSON to write, of any ending; the plot goes beside it as .png.")
 @click.option("--force", is_flag=True, help="Replace both.")
 def command(flight: Path, detector: str, model: Path | None, truth: bool, speed: float | None, heading: float,
             sigma: float | None, out: Path | None, force: bool) -> None:
@@ -71,6 +72,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     if plane.without_position:
         click.echo(f"left out: {plane.without_position} of {len(source.edges)} edges, at which the log has no position "
                    "(x_m, y_m), and the passes that they begin or end")
+    if not source.edges:
+        click.echo("no edges found" + (" in the down range" if truth else f" by {detector}"))
     for number, platform in enumerate(plane.platforms):
         if platform.outline is not None:
             click.echo(f"platform {number}: {platform.outline.area:.3f} m^2, outline 1-sigma {platform.sigma_m:.3f} m")

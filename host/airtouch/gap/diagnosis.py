@@ -165,7 +165,7 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
     pictures: whether to keep the curves that a report shows.
     """
     study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
-    is_effect, terms = result.verdict == "effect", [candidates.term_of(e) for e in result.effects]
+    is_effect, terms = result.verdict == "effect", [t for e in result.effects for t in candidates.terms_of(e)]
     whole_map = gap_map(study, usable, nominal, terms)
     headline = summary.headline(whole_map.cells, bool(terms))
     cells = tuple(dict.fromkeys([c for c in (headline,) if c is not None] + summary.cells_to_show(whole_map)))

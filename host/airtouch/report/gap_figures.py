@@ -1,6 +1,7 @@
 """Plots of the gap without and with the named effects in the model, each as the bytes of a PNG."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +16,8 @@ from airtouch.report.style import BLUE, GREEN, GREY, RED, TITLE_AT, Room, limit,
 BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with the named effects, and of its floor
 #: changes of `style.STYLE` for plots that are read on a phone
 PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
+#: look of the gap without the named effects: broad and pale, so that it shows behind the gap with them
+BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
@@ -27,24 +30,29 @@ PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "
 
 
 def signals(signal: Signal) -> bytes:
-    """PNG of one channel of one flight up to a frequency: measured, modelled, and below their difference."""
-    rows = 1 if signal.measured is None else 2
+    """PNG of one channel of one flight up to a frequency: measured, modelled, their difference, the height."""
+    rows = 1 + (signal.measured is not None) + (signal.height_m is not None)
     with style(PHONE):
         figure, axes = _column(rows, 1.6, LEGENDS)
         if signal.measured is not None:
             axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
-            axes[0].plot(signal.time_s, signal.measured - signal.before, color=BEFORE, lw=1.0, label="model")
+            axes[0].plot(signal.time_s, signal.measured - signal.before, label="model", **BEHIND)
             if signal.after is not None:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
                              label="model with effect")
             axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{_unit(signal.unit)}")
             limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
-        axes[-1].axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
-        axes[-1].plot(signal.time_s, signal.before, color=BEFORE, lw=1.0, label="gap before")
+        gap = axes[0 if signal.measured is None else 1]
+        gap.axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
+        gap.plot(signal.time_s, signal.before, label="gap before", **BEHIND)
         if signal.after is not None:
-            axes[-1].plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
-        axes[-1].set(ylabel=f"measured - model\n{_unit(signal.unit)}", xlabel="time, s")
-        limit(axes[-1], signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
+            gap.plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
+        gap.set_ylabel(f"measured - model\n{_unit(signal.unit)}")
+        if signal.height_m is not None:
+            axes[-1].plot(signal.time_s, signal.height_m, color=BLUE, lw=1.0, label="height over the ground below")
+            axes[-1].set_ylabel("height\nm")
+        axes[-1].set_xlabel("time, s")
+        limit(gap, signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
@@ -58,11 +66,11 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     with style(PHONE):
         figure, axes = _column(rows, 1.35, TITLES)
         for ax, spectrum in zip(axes, shown, strict=True):
-            for label, power, colour, width in (("floor", spectrum.floor, FLOOR, 1.6),
-                                                ("before", spectrum.before, BEFORE, 1.3),
-                                                ("after", spectrum.after, AFTER, 1.3)):
+            looks = {"floor": (spectrum.floor, {"color": FLOOR, "lw": 1.6}), "before": (spectrum.before, BEHIND),
+                     "after": (spectrum.after, {"color": AFTER, "lw": 1.0})}
+            for label, (power, look) in looks.items():
                 if power is not None:
-                    ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), color=colour, lw=width, label=label)
+                    ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), label=label, **look)
             ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left", y=TITLE_AT)
             ax.set_ylabel(f"({_unit(spectrum.unit)})²/Hz")
             ax.grid(alpha=0.2)

@@ -171,10 +171,10 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     """Replay a log's motor commands through a vehicle with effects switched on.
 
     signals: (n, COUNT) where more is known than `signals_of` finds in the log; its rotor speeds and thrusts are
-    overwritten, so hand in a copy. pwm: (n, 4) instead of the log's own. A command that is not finite holds the one
-    before, at the start the first that is. A logged battery voltage is used where the vehicle declares the voltage of
-    its thrust curve. Random parts of effects are drawn from `seed`. Raises AirTouchError without motor commands,
-    and for an actuator delay longer than the delay line.
+    overwritten, so hand in a copy. pwm: (n, 4) instead of the log's own. A command or voltage that is not finite
+    holds the one before, at the start the first that is. A logged battery voltage is used where the vehicle declares
+    the voltage of its thrust curve. Random parts of effects are drawn from `seed`. Raises AirTouchError without motor
+    commands, and for an actuator delay longer than the delay line.
     """
     log.require(*PWM)
     plant, acting = prepare(vehicle, active)
@@ -186,12 +186,12 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
                             f"can hold; give at most {longest_s:g} s")
     volts = np.full(n, np.nan)
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
-        volts = log["vbat_V"].copy()
+        volts = _held(log["vbat_V"])
     effects = slots.slots(acting, [generator(seed, 0, key) for key in keys(acting, first="")])
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
     commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
     if not np.isfinite(commands).all():
-        commands = _held(commands)
+        commands = np.nan_to_num(_held(commands))  # a motor without any command is off
     _run(plant, _Log(s, commands, volts), effects, model)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
@@ -200,12 +200,15 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     return Replay(force, torque, turning, model.speeds, model.volts)
 
 
-def _held(commands: np.ndarray) -> np.ndarray:
-    """Commands (n, 4) whose values that are not finite are the last one before, or the first; 0 where none is."""
-    finite = np.isfinite(commands)
-    last = np.maximum.accumulate(np.where(finite, np.arange(len(commands))[:, None], -1), axis=0)
-    place = np.where(last < 0, finite.argmax(axis=0), last)
-    return np.nan_to_num(np.take_along_axis(commands, place, axis=0), posinf=0.0, neginf=0.0)
+def _held(values: np.ndarray) -> np.ndarray:
+    """Values (n,) or (n, c); those that are not finite are the last one before, or the first; NaN where none is."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return np.array(values, float)
+    rows = np.arange(len(values)).reshape(-1, *([1] * (values.ndim - 1)))
+    last = np.maximum.accumulate(np.where(finite, rows, -1), axis=0)
+    held = np.take_along_axis(values, np.where(last < 0, finite.argmax(axis=0), last), axis=0)
+    return np.where(np.isfinite(held), held, np.nan)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

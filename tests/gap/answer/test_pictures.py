@@ -12,6 +12,7 @@ from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signals.channels import COLUMN, angular_acceleration
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.signatures.candidates import term_of, terms
+from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
 from hovers import FLOOR, LOUDNESS, hover
 from made_diagnosis import cell
@@ -66,6 +67,17 @@ def test_signal_holds_what_is_below_the_frequency_that_it_states(band_hz, push_h
     inside = slice(300, -300)
     assert drawn.highest_hz == highest_hz
     np.testing.assert_allclose(drawn.before[inside], 0.5 + share * push[inside], atol=0.05)
+
+
+def test_height_is_drawn_beside_a_ground_effect_alone_and_where_it_is_known():
+    flown = flight(SECONDS, FORWARD)
+    low = replace(flown, signals=flown.signals.copy(), usable=TIME_S < 10.0)
+    low.signals[:, at.HEIGHT] = 0.08
+    effect = terms("ground_effect")[0].fitted(np.ones(1))
+    np.testing.assert_array_equal(pictures(low, effects=[effect]).signal.height_m, np.where(low.usable, 0.08, np.nan))
+    assert pictures(low, effects=[bias(0.4)]).signal.height_m is None
+    low.signals[:, at.HEIGHT] = 0.0
+    assert pictures(low, effects=[effect]).signal.height_m is None
 
 
 def test_nothing_is_drawn_where_nothing_is_judged():

@@ -14,10 +14,11 @@ from made_diagnosis import cell, diagnosis
 PAGE = Path(__file__).parents[3] / "host/docs/unknown.md"
 
 
-def test_effect_that_does_not_close_the_headline_cell_is_not_its_cause():
+def test_effect_that_shrinks_no_cell_is_the_cause_by_all_of_them():
     cells = [cell("torque_z", "hover", 2.0, 0.004, after=1.9)]
     _, which, how_far = sentences(diagnosis(cells, effects=(NamedEffect("motor_noise", {}),)))
-    assert which == "The effect named, motor noise (probability 93%), does not close this cell."
+    assert which.startswith("Its cause is motor noise (probability 93%): so say all cells together, though it does not "
+                            "shrink this one, nor halve any other.")
     assert "500 to 475 times the floor" in how_far.replace("  ", " ")
 
 
@@ -38,10 +39,27 @@ def test_the_data_are_said_on_which_the_gap_is_measured(judged_on, others, data)
     assert f"of the gap above the floor on data {data}, from 4 to" in sentences(judged)[2]
 
 
-def test_no_cause_is_given_without_a_headline_cell():
+def test_without_a_headline_cell_the_cause_is_by_all_cells_together():
     where, which, _ = sentences(diagnosis([cell("force_z", "hover", 0.05)]))
     assert where == "In no cell of the map does the gap stand out from its floor."
-    assert which.startswith("The effect named, from all cells together, is imu bias")
+    assert which == "Its cause is imu bias (probability 93%): so say all cells together."
+
+
+def test_a_cell_inside_its_floor_that_the_effect_halves_is_said_to_be_one():
+    """As the lift of a ground effect, beside a forward force that it does not touch."""
+    cells = [cell("force_x", "cruise", 0.5, after=0.5), cell("force_z", "cruise", 0.115, after=0.05)]
+    where, which, _ = sentences(diagnosis(cells, effects=(NamedEffect("ground_effect", {}),)))
+    assert where.startswith("The effect named takes most from lift at 0-0.5 Hz: in cruise it is 0.12 m/s^2 without and "
+                            "0.05 m/s^2 with it.")
+    assert which.startswith("Its cause is ground effect (probability 93%)")
+
+
+@pytest.mark.parametrize(("name", "says_why"), [("downwash", True), ("motor_noise", True), ("mass", False)])
+def test_why_cells_grow_is_said_of_what_acts_at_random(name, says_why):
+    cells = [cell("torque_x", "hover", 1.0, after=0.5), cell("torque_y", "hover", 1.0, after=1.5)]
+    where, which, how_far = sentences(diagnosis(cells, effects=(NamedEffect(name, {}),)))
+    assert how_far.count("and 1 got worse.") == 1 and ("acts at random" in how_far) is says_why
+    assert "roll torque" in where and ("the wake of another vehicle overhead" in which) is (name == "downwash")
 
 
 def test_weak_motors_are_named_with_their_rotors():

@@ -16,6 +16,12 @@ def test_an_effect_is_written_with_its_parameters_and_when_it_acts():
     assert words.effect_in_words(replace(push, seconds=())) == "wind: x 0.3 m/s, y 0.11 (0.09 to 0.13)"
 
 
+def test_the_intervals_of_a_flight_name_its_file_once():
+    seconds = (("a/b.csv", 1.0, 1.6), ("a/b.csv", 6.4, 7.0), ("a/b.csv", 11.8, 16.3), ("a/c.csv", 0.0, 2.0))
+    assert words.seconds_in_words(NamedEffect("downwash", {}, seconds)) == (
+        "1.0 to 1.6 s, 6.4 to 7.0 s and 11.8 to 16.3 s of b.csv, 0.0 to 2.0 s of c.csv")
+
+
 def test_an_open_cell_is_written_with_its_seconds_and_what_it_follows():
     cell = OpenCell("force_z", (0.5, 2.0), "cruise", "a/b.csv", from_s=12.0, to_s=18.4, over_floor=6.08,
                     follows=("height", "speed"))

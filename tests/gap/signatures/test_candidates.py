@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.result import NamedEffect
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.alike import interchangeable, names_alike
 from airtouch.gap.signatures.candidates import (
     all_candidates,
@@ -15,6 +15,7 @@ from airtouch.gap.signatures.candidates import (
     strength_term,
     term_of,
     terms,
+    terms_of,
 )
 from airtouch.gap.signatures.signature import CLOCK, MEAN, SPECTRUM
 from airtouch.simulation.effects import EFFECTS, get
@@ -95,3 +96,16 @@ def test_several_gains_are_the_term_in_which_all_of_them_are_free():
     together = terms("controller_gain")[0]
     lower = together.quantities(together.scaled({"rate": 0.9, "attitude": 0.7, "position": 0.8, "height": 0.95}))
     assert term_of(NamedEffect("controller_gain", lower)).free == together.free
+
+
+@pytest.mark.parametrize(("name", "strength", "turbulence"), [
+    ("ground_effect", 1.6, 0.2), ("ground_effect", 1.6, 0.0), ("downwash", 0.02, 5.0)])
+def test_a_named_effect_is_a_steady_mean_and_a_random_part_with_all_of_its_force(name, strength, turbulence):
+    """The random force is the strength times the turbulence; it acts in the seconds of the effect."""
+    seconds = (("one.csv", 1.0, 2.0),)
+    named = NamedEffect(name, {"strength": Quantity(strength), "turbulence": Quantity(turbulence)}, seconds)
+    mean, *random = terms_of(named)
+    assert (mean.shows_in, mean.values["turbulence"], mean.values["strength"]) == (MEAN, 0.0, strength)
+    assert [(t.shows_in, t.gate) for t in random] == [(SPECTRUM, seconds)] * (turbulence > 0.0)
+    for part in random:
+        assert part.values["strength"] * part.values["turbulence"] == pytest.approx(strength * turbulence)

@@ -237,3 +237,15 @@ def test_stretches_leave_contact_out():
     hover = flight(10.0)
     hover.usable[300:400] = False
     assert stretches(hover) == [(0, 300), (400, 1000)]
+
+
+def test_a_random_effect_that_passes_adds_its_power_in_its_seconds_alone():
+    """Noise four times as loud as declared for a quarter of the flight: with the effect there, the declared is left."""
+    force = noise(40.0, NOISE, 3)
+    force[1000:2000] *= 4.0
+    flown = flight(40.0, force, name="shaken")
+    term = terms("imu_noise")[0]
+    louder = replace(term, values={**term.values, "factor": 4.0}, gate=(("shaken", 10.0, 20.0),))
+    c = cell(maps.gap_map(study(), [flown], terms=[louder]), "force_x", 5)
+    assert c.gap == pytest.approx(NOISE * np.sqrt((3.0 + 16.0) / 4.0 * WIDTH[5] / 50.0), rel=0.1)
+    assert c.after < 0.6 * c.gap

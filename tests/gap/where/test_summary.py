@@ -51,6 +51,17 @@ def test_headline_of_named_effects_is_where_they_take_most():
             "(18 times the floor, as before)") in sentences(result)[2]
 
 
+def test_headline_of_an_effect_that_halves_no_cell_is_where_it_takes_most():
+    """Of 16 floors 4 % go, of 4 floors 30 %; a cell inside its floor counts only where no other shrinks."""
+    large, shrinking = cell("torque_x", "hover", 1.6, after=1.55), cell("force_z", "hover", 0.4, after=0.33)
+    inside = cell("force_y", "hover", 0.115, after=0.05)
+    assert summary.headline([large, shrinking, inside], True) is shrinking
+    assert summary.headline([large, inside], True) is inside
+    assert summary.headline([large, replace(inside, blocks=1)], True) is large
+    assert summary.headline([large, replace(inside, after=0.11)], True) is large
+    assert summary.headline([large, shrinking, inside]) is large
+
+
 def test_a_cell_without_an_interval_may_stand_out_and_is_not_significant():
     """As those of flights without a gyro."""
     known, unknown = cell("force_z", "hover", 0.5), Cell("force_z", (0.0, 0.2), "hover", 0.5, 0.1, "m/s^2")

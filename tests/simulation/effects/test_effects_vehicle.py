@@ -167,3 +167,15 @@ def test_a_command_that_is_lost_holds_the_one_before(vehicle):
     np.testing.assert_array_equal(rotor_speeds(lost, vehicle).rotor_speed, rotor_speeds(held, vehicle).rotor_speed)
     lost[:, 0], held[:, 0] = np.nan, 0.0  # of a motor without any command: off
     np.testing.assert_array_equal(rotor_speeds(lost, vehicle).rotor_speed, rotor_speeds(held, vehicle).rotor_speed)
+
+
+def test_a_voltage_that_is_lost_holds_the_one_before(vehicle):
+    pwm, n = np.full((60, 4), 36000.0), 60
+    fly = {f"m{i + 1}_pwm": pwm[:, i] for i in range(4)} | {"t_s": 0.01 * np.arange(n)}
+    low = np.full(n, 3.4)
+    sparse = np.where(np.arange(n) % 10 == 3, low, np.nan)
+    every_row, few_rows = (replay.run(FlightLog({**fly, "vbat_V": v}, {}), vehicle) for v in (low, sparse))
+    np.testing.assert_array_equal(few_rows.specific_force, every_row.specific_force)
+    unknown, none = (replay.run(FlightLog({**fly, **v}, {}), vehicle) for v in ({"vbat_V": low * np.nan}, {}))
+    np.testing.assert_array_equal(unknown.specific_force, none.specific_force)
+    assert few_rows.specific_force[-1, 2] < none.specific_force[-1, 2], "it is lower than the nominal one"

@@ -13,6 +13,7 @@ from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import interval, short
+from airtouch.gap.where.summary import significant
 
 MOST_CELLS = 16  #: rows of a table of cells, largest first; no source: fits a terminal
 #: column of a table of cells -> (text of a cell, columns of the narrowest terminal that shows it)
@@ -34,8 +35,10 @@ NUMBERS = ("gap", "floor", "gap/floor", "after")
 def cell_table(cells: Iterable[Cell], title: str, width: int) -> Table:
     """A table of cells of a gap map for a terminal of a width; a column that says nothing is left out."""
     cells = list(cells)[:MOST_CELLS]
+    inside = bool(cells) and not significant(cells[0])
     table = Table(title=title, title_justify="left", caption_justify="left",
-                  caption="90 % intervals; a cell is listed when its interval clears the floor's")
+                  caption="90 % intervals; a cell is listed when its interval clears the floor's"
+                          + ("; the first, which does not, is that of the answer" if inside else ""))
     columns = [(name, text) for name, (text, least) in CELL_COLUMNS.items()
                if width >= least and any(text(cell) for cell in cells)]
     for name, _ in columns:

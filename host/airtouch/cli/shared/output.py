@@ -12,7 +12,8 @@ from rich.table import Table
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report.columns import COLUMNS, cell
 
-CAPTION = ("second line: 95 % interval, bootstrap by flight. missed: no detection is within 1.5 s of the edge. "
+INTERVALS = "second line: 95 % interval, bootstrap by flight. "
+CAPTION = ("missed: no detection is within 1.5 s of the edge. "
            "false/min: detections a minute that belong to no edge; each edge has one at most. "
            "in 0.05 m: fraction of all true edges, missed ones included, whose error is at most 0.05 m.")
 WIDE = 150  #: columns of a terminal on which a row of figures fits
@@ -22,9 +23,11 @@ SIDE_BY_SIDE = [{"s": "mean |error|, s"}.get(name, name) for name in ("flights",
 
 def print_table(screen: Console, rows: Mapping[str, dict[str, Any]], title: str) -> None:
     """Print figures and intervals of each summary: a row for each, or on a narrow terminal a column for each."""
+    has_intervals = any("\n" in figure for row in rows.values() for figure in _cells(row))
+    caption = INTERVALS * has_intervals + CAPTION
     if screen.width >= WIDE:
         screen.print(_table(title, ["", "flights", "edges", *COLUMNS],
-                            [[name, *_cells(row)] for name, row in rows.items()], CAPTION))
+                            [[name, *_cells(row)] for name, row in rows.items()], caption))
         return
     names = list(rows)
     count = max((screen.width - NAME_WIDTH) // SUMMARY_WIDTH, 1)
@@ -33,7 +36,7 @@ def print_table(screen: Console, rows: Mapping[str, dict[str, Any]], title: str)
         last = first + count >= len(names)
         screen.print(_table(title if first == 0 else "", ["", *shown],
                             zip(SIDE_BY_SIDE, *(_cells(rows[name]) for name in shown), strict=True),
-                            CAPTION if last else ""))
+                            caption if last else ""))
 
 
 def _cells(row: dict[str, Any]) -> list[str]:

@@ -1,7 +1,7 @@
 """The curves of a report: signals of the headline's cell, spectra, commands."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,7 +20,9 @@ from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
+from airtouch.simulation import signals as at
 
+GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
 #: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
@@ -45,7 +47,8 @@ class Signal:
     """One channel of one flight up to a frequency; curves (n,), NaN where nothing is judged.
 
     measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
-    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: of the headline's cell.
+    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: of the headline's cell;
+    height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known.
     """
 
     flight: str
@@ -58,6 +61,7 @@ class Signal:
     before: np.ndarray
     after: np.ndarray | None
     floor: float
+    height_m: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,10 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     median = _median_residual(residuals, cells[0].channel)
-    return Pictures(None if median is None else _signal(median, cells[0]), frequencies(AIR),
+    signal = None if median is None else _signal(median, cells[0])
+    if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
+        signal = replace(signal, height_m=_height(median.flight))
+    return Pictures(signal, frequencies(AIR),
                     _spectra(study, residuals, effects, channels), commands)
 
 
@@ -112,6 +119,13 @@ def _signal(residual: FlightResidual, cell: Cell) -> Signal:
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
     return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, measured, _lowpass(flight, residual.before[:, c], highest_hz), after, cell.floor)
+
+
+def _height(flight: Flight) -> np.ndarray | None:
+    """Height of the rotors over the ground below (n,), m, NaN where nothing is judged; None where it is not known."""
+    if not flight.signals[:, at.HEIGHT].any():
+        return None
+    return np.where(flight.usable, flight.signals[:, at.HEIGHT], np.nan)
 
 
 def _median_residual(residuals: Sequence[FlightResidual], channel: str) -> FlightResidual | None:

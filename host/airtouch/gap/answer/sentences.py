@@ -6,6 +6,8 @@ from pathlib import Path
 from airtouch.gap.answer.words import joined, name_in_words, quantity
 from airtouch.gap.result import FITTED, REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
 from airtouch.gap.signals.channels import CHANNEL_WORDS
+from airtouch.gap.signatures.candidates import is_random, random_of, terms_of
+from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import PHASE_WORDS, band_in_words, change_in_words, short
@@ -36,10 +38,14 @@ def _where(diagnosis: Diagnosis) -> str:
     cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
     standing_out = len({c.phase for c in summary.same_place(cells, cell)})
     flown = len({c.phase for c in cells if c.phase != summary.GROUND_NAME})
+    place = f"{CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: {PHASE_WORDS[cell.phase]} it is"
+    if not summary.stands_out(cell):
+        return (f"The effect named takes most from {place} {short(cell.gap)} {cell.unit} without and "
+                f"{short(cell.gap if cell.after is None else cell.after)} {cell.unit} with it. No single cell that it "
+                "halves stands out from its floor.")
     most = summary.headline(cells) or cell  # the effects named may close another
     begin = "The gap lies mostly" if summary.same_place([cell], most) else "A part of the gap lies"
-    return (f"{begin} in {CHANNEL_WORDS[cell.channel]} at {band_in_words(cell)}: "
-            f"{PHASE_WORDS[cell.phase]} it is {short(cell.gap)} {cell.unit}, {short(cell.ratio)} times the floor"
+    return (f"{begin} in {place} {short(cell.gap)} {cell.unit}, {short(cell.ratio)} times the floor"
             + (f", and it stands out in {standing_out} of {flown} phases in the air." if flown > 1 else "."))
 
 
@@ -54,13 +60,15 @@ def _which(diagnosis: Diagnosis) -> str:
         return (f"No known effect explains it (probability {probability})"
                 + (f"; the nearest is {name_in_words(near.name)} with {near.probability:.1%}." if near else "."))
     first, *others = (_named(e) for e in diagnosis.effects)
-    cell = diagnosis.headline
-    if cell is not None and cell.after is not None and not summary.closes(cell):
-        sentence = f"The effect named, {first} (probability {probability}), does not close this cell"
-        return sentence + (f", nor does {joined(others)} beside it." if others else ".")
-    begin = "Its cause" if cell is not None else "The effect named, from all cells together,"
-    return f"{begin} is {first} (probability {probability})" \
-        + (f", with {joined(others)} beside it." if others else ".") + _without_baseline(diagnosis)
+    cell, they = diagnosis.headline, "they do" if others else "it does"
+    beside = f", with {joined(others)} beside it" if others else ""
+    caveat = _without_baseline(diagnosis)
+    cause = f"Its cause is {first} (probability {probability}){beside}"
+    if cell is None or not summary.stands_out(cell):
+        return f"{cause}: so say all cells together.{caveat}"
+    if cell.after is not None and not summary.shrinks(cell):
+        return f"{cause}: so say all cells together, though {they} not shrink this one, nor halve any other.{caveat}"
+    return f"{cause}.{caveat}"
 
 
 def _without_baseline(diagnosis: Diagnosis) -> str:
@@ -73,7 +81,8 @@ def _without_baseline(diagnosis: Diagnosis) -> str:
 def _named(effect: NamedEffect) -> str:
     """The effect's name, and of which rotor."""
     rotor = effect.parameters.get("rotor")
-    return name_in_words(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+    return (name_in_words(effect.name) + (f" of rotor {rotor.value:.0f}" if rotor else "")
+            + (", the wake of another vehicle overhead" if effect.name == OVERHEAD else ""))
 
 
 def _how_far(diagnosis: Diagnosis) -> str:
@@ -94,7 +103,18 @@ def _how_far(diagnosis: Diagnosis) -> str:
     data = f"that {they} fitted to" if diagnosis.judged_on == FITTED else "held out"
     return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
             f"floor on data {data}, from {short(before)} to {short(after)} times the floor"
-            f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}.")
+            f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}."
+            f"{_why_cells_stay(diagnosis)}")
+
+
+def _why_cells_stay(diagnosis: Diagnosis) -> str:
+    """Why single cells grow while the gap closes, where an effect named acts at random; "" where none does."""
+    cells = diagnosis.map.cells if diagnosis.map else diagnosis.where
+    at_random = any(is_random(e.name) or random_of(terms_of(e)) for e in diagnosis.effects)
+    if not at_random or not summary.worse(cells):
+        return ""
+    return (" What acts at random is known by its mean power, not by its course: this share counts all cells together, "
+            "and a single cell may shrink less or grow.")
 
 
 def _cells_in_words(cells: Sequence[Cell]) -> str:

@@ -1,6 +1,7 @@
 """Parts of a diagnosis in words: numbers, effects, what stays open, candidates that are shown."""
 
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 
 from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
@@ -45,8 +46,9 @@ def effect_in_words(effect: NamedEffect) -> str:
 
 
 def seconds_in_words(effect: NamedEffect) -> str:
-    """When an effect acts, "" where it always does."""
-    return ", ".join(f"{begin:.1f} to {end:.1f} s of {Path(flight).name}" for flight, begin, end in effect.seconds)
+    """When an effect acts, as `1.0 to 1.6 s and 6.4 to 7.0 s of log.csv`; "" where it always does."""
+    return ", ".join(f"{joined([f'{begin:.1f} to {end:.1f} s' for _, begin, end in intervals])} of {Path(flight).name}"
+                     for flight, intervals in groupby(effect.seconds, key=lambda interval: interval[0]))
 
 
 def all_open_in_words(cells: Sequence[OpenCell]) -> list[str]:

@@ -115,6 +115,21 @@ def term_of(effect: NamedEffect) -> Term:
     return replace(nearest, values={**nearest.values, **values}, gate=effect.seconds)
 
 
+def terms_of(effect: NamedEffect) -> list[Term]:
+    """The terms of an effect that a diagnosis named: that of its mean and, where it has one, that of its random part.
+
+    The random part is one of strength 1, as it is fitted: the inverse of `named_effects.with_random_part`.
+    """
+    term = term_of(effect)
+    without = term.signature.without_random
+    if without is None or all(term.values[k] == v for k, v in without.items()):
+        return [term]
+    (strength,), part = term.signature.free, random_part_of(effect.name)
+    at_strength_1 = {k: term.values[strength] * term.values[k] for k in part.free}
+    return [replace(term, values={**term.values, **without}),
+            replace(part, values={**part.values, **at_strength_1}, gate=effect.seconds)]
+
+
 def _random(effect: Effect) -> bool:
     """Whether two seeds give two forces on the same signals, those of PROBE."""
     if effect.wrench is None:

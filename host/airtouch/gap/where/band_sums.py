@@ -1,6 +1,6 @@
 """The gap cut into bands and summed over short blocks of each phase: what the gap map is made of."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,17 +98,36 @@ def block_sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
         if flight.rates is None:  # torque is known at low frequency only, and not at rest
             bands[0 if flight.on_ground[start] else 1:, :, TORQUE] = np.nan
         flat = (bands ** 2).transpose(1, 0, 2).reshape(stop - start, -1)
-        for first, last in runs_of_phases(flight.phase[start:stop]):
-            here = slice(first, last)
-            mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
-            if mask[0].any():
-                parts.append((flight.phase[start + first], mask.sum(axis=1),
-                              (mask @ flat[here]).reshape(len(REGIMES), len(MAP_BANDS_HZ), COUNT),
-                              mask @ bands[0, here]))
+        for here, mask in _blocks_with_samples(flight, member, start, stop):
+            parts.append((flight.phase[start + here.start], mask.sum(axis=1),
+                          (mask @ flat[here]).reshape(len(REGIMES), len(MAP_BANDS_HZ), COUNT),
+                          mask @ bands[0, here]))
     if not parts:
         return join([])
     phase, weight, power, mean = (np.array(column) for column in zip(*parts, strict=True))
     return Sums(phase.astype(int), np.zeros(len(phase), int), weight, power, mean)
+
+
+def samples_within(flight: Flight, acts: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+    """Samples (b, r) of the blocks of `block_sums`, in each of REGIMES, at which acts (n,) is true."""
+    member = regimes(flight, vehicle)
+    rows = [mask @ acts[start:stop][here] for start, stop in stretches(flight)
+            for here, mask in _blocks_with_samples(flight, member, start, stop)]
+    return np.array(rows).reshape(-1, len(REGIMES))
+
+
+def _blocks_with_samples(flight: Flight, member: np.ndarray, start: int, stop: int,
+                         ) -> Iterator[tuple[slice, np.ndarray]]:
+    """The blocks of a stretch that have a sample: their place in it, and (r, samples) 1 in each regime, else 0.
+
+    member (n, r): which samples of the flight are in which of REGIMES.
+    """
+    valid = ~flight.bridged[start:stop]
+    for first, last in runs_of_phases(flight.phase[start:stop]):
+        here = slice(first, last)
+        mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
+        if mask[0].any():
+            yield here, mask
 
 
 def stretches(flight: Flight) -> list[tuple[int, int]]:

@@ -9,18 +9,19 @@ flights), and never narrower than the time-bandwidth product of the cell allows.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
 from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, inside
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
-from airtouch.gap.where.band_sums import Sums, block_sums, join
+from airtouch.gap.where.band_sums import Sums, block_sums, join, samples_within
 from airtouch.gap.where.cell import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
@@ -77,20 +78,25 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
     at a time besides those that the caller keeps.
     """
     return assemble(study, [part_of(study, f, terms) for f in flights], [part_of(study, f) for f in baseline],
-                    [t.name for t in terms])
+                    [group[0].name for group in _effects(terms)])
 
 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     gap = study.residual(flight)
-    after = _sums_with(study, flight, terms) if terms else None
+    after, groups = _sums_with(study, flight, terms) if terms else None, _effects(terms)
     return Part(flight.name, block_sums(flight, gap, study.vehicle), after,
-                tuple(_sums_with(study, flight, [t]) for t in terms) if len(terms) > 1 else ())
+                tuple(_sums_with(study, flight, group) for group in groups) if len(groups) > 1 else ())
+
+
+def _effects(terms: Sequence[Term]) -> list[list[Term]]:
+    """The terms of each effect, its mean and its random part, which follow each other."""
+    return [list(group) for _, group in groupby(terms, key=lambda t: t.identity)]
 
 
 def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
              effects: Sequence[str] = ()) -> GapMap:
-    """The map made of the parts of flights; effects: names of the terms with which the parts were made."""
+    """The map made of the parts of flights; effects: names of those with which the parts were made."""
     joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
     floors = floors_of(join([p.before for p in nominal]), sensor) if nominal \
         else spreads_of(joined, sensor)
@@ -115,22 +121,24 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
     random = random_of(terms)
     if not random or not len(gap.phase):
         return gap
-    modelled = _random_power(study, flight, random)
-    sensor, power = sensor_rms(study.vehicle) ** 2, gap.power.copy()
-    for rows, state in ((gap.phase == GROUND, REST), (gap.phase != GROUND, AIR)):
-        weight = gap.weight[rows][:, :, None, None]
-        noise = np.minimum(sensor * weight, gap.power[rows])
-        power[rows] = noise + np.abs(gap.power[rows] - noise - weight * modelled[state])
-    return replace(gap, power=power)
+    sensor = sensor_rms(study.vehicle) ** 2
+    noise = np.minimum(sensor * gap.weight[:, :, None, None], gap.power)
+    return replace(gap, power=noise + np.abs(gap.power - noise - _random_power(study, flight, random, gap)))
 
 
-def _random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> dict[str, np.ndarray | float]:
-    """Mean power (bands, COUNT) that random effects add in a flight, by state of blocks; 0 where it has no block."""
-    data, out = Data(study, [flight]), {}
-    for state in (REST, AIR):
-        density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
-        out[state] = sum(np.einsum("bf,fc->bc", density, p.mean(axis=0)) if len(p) else 0.0
-                          for p in (random_effects.extra_power(data, t)[0][state] for t in terms))
+def _random_power(study: Study, flight: Flight, terms: Sequence[Term], of_blocks: Sums) -> np.ndarray:
+    """Sums of squares (b, r, bands, COUNT) that random effects add to the block sums of a flight.
+
+    An effect adds its mean power in the flight at each sample at which it acts, and none at the others.
+    """
+    data, out = Data(study, [flight]), np.zeros_like(of_blocks.power)
+    for term in terms:
+        power = random_effects.extra_power(data, replace(term, gate=()))[0]
+        acting = samples_within(flight, inside(term.gate, flight), study.vehicle) if term.gate else of_blocks.weight
+        for rows, state in ((of_blocks.phase == GROUND, REST), (of_blocks.phase != GROUND, AIR)):
+            if len(power[state]):
+                density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
+                out[rows] += acting[rows][:, :, None, None] * (density @ power[state].mean(axis=0))
     return out
 
 

@@ -10,9 +10,10 @@ a its gap with the named effects in the model.
     energy        n ((g / F)^2 - 1)                   0 where it does not stand out
     removed       n ((g / F)^2 - max(a / F, 1)^2)     0 where it does not stand out
     closes        removed >= HALF energy > 0
+    shrinks       it stands out, and WORSE a <= g
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -104,20 +105,46 @@ def closes(cell: Cell) -> bool:
     return removed(cell) >= HALF * energy(cell) > 0.0
 
 
+def shrinks(cell: Cell) -> bool:
+    """Whether the cell stands out, and is smaller with the named effects, by about a tenth or more."""
+    return cell.after is not None and stands_out(cell) and WORSE * cell.after <= cell.gap
+
+
+def within_floor(cell: Cell) -> float:
+    """Power over that of the floor, in blocks, that the named effects take from a cell that does not stand out.
+
+    0 where they take less than half of its power, or less than the floor's power of one block: that may be chance.
+    """
+    if cell.after is None or stands_out(cell):
+        return 0.0
+    before, after = over_floor(cell) ** 2, over_floor(cell, cell.after) ** 2
+    taken = max(cell.blocks, 1) * (before - after)
+    return taken if taken >= 1.0 and before - after >= HALF * before else 0.0
+
+
 def headline(cells: Sequence[Cell], named: bool = False) -> Cell | None:
     """The cell that stands for the gap; None where no cell in the air stands out.
 
-    It is in the channel and band with most energy over all phases in the air (with named effects: from which they
-    take most, among cells that they halve; where they halve none, as without), there in the phase with most of it. A
-    short phase with one large ratio is not the gap.
+    It is in the channel and band with most energy over all phases in the air, there in the phase with most of it. A
+    short phase with one large ratio is not the gap. With named effects it is instead where they take most, among the
+    first of these cells that there are: those that they halve; those that they shrink; those inside their floor that
+    they halve (`within_floor`). Where there are none, it is as without.
     """
-    weight = (lambda c: removed(c) if closes(c) else 0.0) if named else energy
+    weights: list[Callable[[Cell], float]] = [energy]
+    if named:
+        weights = [lambda c: removed(c) if closes(c) else 0.0, lambda c: removed(c) if shrinks(c) else 0.0,
+                   within_floor, energy]
+    return next((c for w in weights if (c := _heaviest(cells, w)) is not None), None)
+
+
+def _heaviest(cells: Iterable[Cell], weight: Callable[[Cell], float]) -> Cell | None:
+    """The cell in the air with most weight, within the channel and band with most; None where all have 0."""
     air = [c for c in cells if c.regime == "all" and c.phase != GROUND_NAME and weight(c) > 0.0]
     total: dict[tuple, float] = {}
     for c in air:
         total[c.channel, c.band_hz] = total.get((c.channel, c.band_hz), 0.0) + weight(c)
     if not total:
-        return headline(cells) if named else None
+        return None
     best = max(total, key=total.__getitem__)
     return max((c for c in air if (c.channel, c.band_hz) == best), key=weight)
 
