@@ -8,6 +8,7 @@ import pytest
 from airtouch import logs
 from airtouch.detector.evaluation.evaluate import remarks
 from airtouch.logs.checks.clock import lost_samples, true_period
+from airtouch.logs.checks.quality import summary
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
 
@@ -121,6 +122,11 @@ def test_a_platform_crossed_on_a_lower_leg_is_no_landing():
     columns |= dict.fromkeys(PWM, np.where((time > 0.9) & (time < 29.2), 40000.0 + np.arange(3000) % 9, 0.0))
     segments = logs.segments(FlightLog(columns, {"source": "made", "warnings": []}))
     assert [(s.start, s.stop) for s in segments if s.kind == "over platform"] == [(2101, 2400)]
+
+
+def test_a_group_of_channels_is_there_with_any_axis():
+    part = FlightLog({name: values for name, values in sound_flight().columns.items() if "_x_" not in name}, {})
+    assert summary(part)["channels"] == ["acc", "gyro", "pwm", "range"]
 
 
 def test_a_down_range_without_a_value_is_not_the_ground():

@@ -87,7 +87,8 @@ def trace_of(log: FlightLog, model: BestModel, logits: np.ndarray, edge: np.ndar
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
     signals = {"logits": logits} if absent else {"channels": nine_channels(log), "logits": logits}
     return Trace(np.where(airborne, over, 0.0), edges, signals,
-                 sensor_note.note(absent, bool(absent) and model_file.is_shipped(model, absent)))
+                 sensor_note.note(absent, bool(absent) and model_file.is_shipped(model, absent),
+                                  sensors.columns_missing_in_part(log, absent)))
 
 
 def flight_events(log: FlightLog, model: BestModel) -> StreamEvents:
