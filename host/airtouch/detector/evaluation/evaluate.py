@@ -103,12 +103,12 @@ def remarks(log: FlightLog) -> list[str]:
     time_s = log["t_s"] if log.has("t_s") else np.empty(0)
     gaps = lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S)
     holes, lost = [g for g in gaps if g.seconds >= LONG_HOLE_S], sum(g.lost for g in gaps)
-    if lost > MOST_LOST * (len(log) + lost) and not back:
-        clock.append(f"{lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were")
     if holes and not back:
         longest = max(holes, key=lambda g: g.seconds)
         clock.append(f"no sample in {longest.seconds:.2f} s before sample {longest.sample}; rows are taken as if there "
                      "were no hole")
+    if lost > MOST_LOST * (len(log) + lost) and not back:
+        clock.append(f"{lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were")
     return [str(w) for w in log.meta.get("warnings", [])] + clock
 
 
