@@ -38,7 +38,7 @@ LINK_TIMEOUT_S = 1.0  #: s without a link after which the firmware deletes its l
 class Server:
     """The virtual Crazyflie. `run` serves until `stop`; clients connect to `uri`.
 
-    scenario, vehicle: names, files or objects. effects, without: as in `airtouch simulate`. The drone
+    scenario (or mission), vehicle: names, files or objects. effects, without: as in `airtouch simulate`. The drone
     stands at the start of the scenario's mission. speed: multiple of real time. faults: texts or
     `Fault`s. record: file of the flight log, written at the end.
     Raises AirTouchError for settings that cannot be flown, a port in use and a `record` that exists.
