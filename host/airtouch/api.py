@@ -173,14 +173,12 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name, a wrong number and a
     flight that diverges.
     """
-    from airtouch.crazyflie import mission
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
     for name, value, least in (("flights", flights, 1), ("seed", seed, 0)):
         if not isinstance(value, numbers.Integral) or value < least:
             raise AirTouchError(f"{name} must be a whole number from {least}, not {value!r}")
-    scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
     logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=effects, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]
     if lost:
