@@ -26,6 +26,7 @@ from airtouch.logs import Edge, true_edges
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.vehicle import arm_pwm_of
 
 ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
 TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
@@ -98,8 +99,8 @@ class TimedEdges:
 
 
 def true_edges_of(log: FlightLog) -> TimedEdges:
-    """The edges of the down range."""
-    return TimedEdges(true_edges(log), 0.0, TRUE_SIGMA_S)
+    """The edges of the down range, in the air by the vehicle that the log names."""
+    return TimedEdges(true_edges(log, arm_pwm=arm_pwm_of(log.meta)), 0.0, TRUE_SIGMA_S)
 
 
 def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = None) -> TimedEdges:
@@ -108,8 +109,9 @@ def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
     """
     module = registry.get(detector)
-    evaluate.check(log, evaluate.spare_of(module))
-    trained = registry.model_for(module, module.load(model), log)
+    loaded = module.load(model)
+    evaluate.check(log, evaluate.spare_of(module), evaluate.arm_pwm_by(module, loaded))
+    trained = registry.model_for(module, loaded, log)
     return TimedEdges(module.run(log, trained).edges, module.lag_s(trained), _sigma_s(trained, log))
 
 
