@@ -114,10 +114,11 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     from airtouch.detector.evaluation import evaluate as scoring
 
     module, log = registry.get(detector), read(flight)
-    scoring.check(log, scoring.spare_of(module))
+    trained = module.load(Path(model) if model else None)
+    scoring.check(log, scoring.spare_of(module), scoring.arm_pwm_by(module, trained))
     for remark in scoring.remarks(log):
         warnings.warn(f"{log.source}: {remark}", stacklevel=_caller_level())
-    return module.run(log, registry.model_for(module, module.load(Path(model) if model else None), log))
+    return module.run(log, registry.model_for(module, trained, log))
 
 
 @in_python
@@ -151,7 +152,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained, note) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
-        scoring.check(log, scoring.spare_of(module))
+        scoring.check(log, scoring.spare_of(module), scoring.arm_pwm_by(module, trained))
         if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
         result = scoring.evaluate_flight(file, log, module, trained)
@@ -251,10 +252,11 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     files = _several(flights)
     if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
         raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
+    start = best.load(None)
     usable, left_out, simulator, work = adapt_report.prepared(
         dataset.collect(files, speed_mps), out, None if twin is None else Path(twin), vehicle, speed_mps=speed_mps,
-        seed=seed, bar=_stages(progress))
-    adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=best.load(None), seed=seed,
+        seed=seed, bar=_stages(progress), start=start)
+    adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=start, seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)
