@@ -112,6 +112,11 @@ def lag_s(model: BestModel | None) -> float:
     return float((model or load(None)).metadata["lag_s"])
 
 
+def arm_pwm(model: BestModel | None) -> float:
+    """Mean PWM above which the model takes the vehicle to be in the air: of the vehicle that it was trained for."""
+    return (model or load(None)).recipe.motion.arm_pwm
+
+
 def parameters(model: BestModel | None) -> dict[str, Any]:
     """Numbers by name, for reports: size, cost, settings of the decoder, seed."""
     model = model or load(None)
