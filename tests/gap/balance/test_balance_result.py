@@ -85,3 +85,17 @@ def test_without_the_shift_of_the_centre_a_weight_loads_all_rotors_alike():
     thrust = np.repeat(1.0 + drawn["fraction"][:, None], 4, axis=1)
     assert name == "mass"
     np.testing.assert_allclose(weight.change, commanded_change(thrust), atol=1e-12)
+
+
+def test_where_no_effect_is_named_nothing_closes_the_gap():
+    """Commands that no known effect asks for: no cell has a gap that is left with it."""
+    nominal = [hovering(seed) for seed in (1, 2, 3)]
+    odd = hovering(4)
+    result = balance_result.diagnosis([replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])], nominal, VEHICLE)
+    plain = result.plain()
+    assert result.verdict == "unknown" and plain["gap"]["after"] == plain["gap"]["before"] > 10.0
+    assert not any("after" in cell for cell in [*plain["where"], *plain["map"], plain["headline"]])
+    shrink = {r["name"]: r["shrink"] for r in plain["ranking"]}
+    for name in ("none", "unknown"):
+        assert (shrink[name]["value"], shrink[name].get("measured")) == (0.0, False)
+    assert "measured" not in shrink["weak_motor"]

@@ -38,6 +38,7 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 #: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen, those that a
 #: hover shows (`signature.WRONG` has others)
 WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
+NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
 LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
@@ -71,12 +72,12 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     judged = evidence(pattern, base, candidates)
     probability_of = probabilities(judged, candidates)
     first, probability = answer_of(probability_of)
-    verdict = first if first in ("none", "unknown") else "effect"
+    verdict = first if first in NO_EFFECTS else "effect"
     fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
-    cells = _cells(gap, base, vehicle, fits[first], len(flights))
+    cells = _cells(gap, base, vehicle, fits[first] if effects else None, len(flights))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
@@ -128,7 +129,10 @@ def control_of(probability_of: Mapping[str, float], first: str, closures: Mappin
 
 def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
                ) -> list[RankedCandidate]:
-    """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
+    """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
+
+    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured.
+    """
     together = _weights_together(first, probability_of)
     best = max(together.values())
 
@@ -140,8 +144,13 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
             return f"counted with {first}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
-    return sorted((RankedCandidate(n, p, closures[n].shrink, reason(n, p)) for n, p in together.items()),
-                  key=lambda r: (r.name != first, -r.probability))
+    def candidate(name: str, probability: float) -> RankedCandidate:
+        """A candidate's row."""
+        is_effect = name not in NO_EFFECTS
+        return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
+                               reason(name, probability), measured=is_effect)
+
+    return sorted((candidate(n, p) for n, p in together.items()), key=lambda r: (r.name != first, -r.probability))
 
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
@@ -152,17 +161,22 @@ def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[s
     return {**probability_of, first: probability_of[first] + probability_of[other], other: 0.0}
 
 
-def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, flights: int) -> tuple[Cell, ...]:
-    """The gap (4,) of BALANCE as lift and angular accelerations in hover, largest over the floor first."""
+def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | None, flights: int,
+           ) -> tuple[Cell, ...]:
+    """The gap (4,) of BALANCE as lift and angular accelerations in hover, largest over the floor first.
+
+    fit: of the effects named, None where none is: the cells then have no `after`.
+    """
     half_side, lift = vehicle.arm_m / np.sqrt(2.0), vehicle.mass_kg * vehicle.gravity_mps2
     inertia = vehicle.inertia_kg_m2
     unit = np.array([vehicle.gravity_mps2, lift * half_side / inertia[0], lift * half_side / inertia[1],
                      lift * vehicle.yaw_torque_over_thrust_m / inertia[2]])  # of each entry in its channel's unit
-    after = gap - fit.change
+    after = None if fit is None else np.abs(gap - fit.change) * unit
     floor = np.sqrt(base.variance[BALANCE])
     channels = (("force_z", "m/s^2"), *((f"torque_{a}", "rad/s^2") for a in "xyz"))
     cells = [Cell(c, BAND_HZ, "hover", float(abs(gap[i]) * unit[i]), float(floor[i] * unit[i]), u,
-                  flights=flights, after=float(abs(after[i]) * unit[i])) for i, (c, u) in enumerate(channels)]
+                  flights=flights, after=None if after is None else float(after[i]))
+             for i, (c, u) in enumerate(channels)]
     return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
