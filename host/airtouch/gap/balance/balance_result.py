@@ -10,6 +10,7 @@ import numpy as np
 
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
+from airtouch.gap.answer.shrink import fraction_closed
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
@@ -27,6 +28,7 @@ from airtouch.gap.balance.hover_posterior import (
 )
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
+from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
 from airtouch.gap.signals.spectra import MOST_LOST
@@ -39,7 +41,6 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 #: hover shows (`signature.WRONG` has others)
 WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
 NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
-LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
            "it is; candidates that leave both as they are were not tried")
@@ -72,16 +73,20 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     judged = evidence(pattern, base, candidates)
     probability_of = probabilities(judged, candidates)
     first, probability = answer_of(probability_of)
-    verdict = first if first in NO_EFFECTS else "effect"
     fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
+    withdrawn = first if first not in NO_EFFECTS and closes_too_little(closures[first]) else ""
+    if withdrawn:
+        probability_of = without_name(withdrawn, probability_of)
+        first, probability = "unknown", probability_of["unknown"]
+    verdict = first if first in NO_EFFECTS else "effect"
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first] if effects else None, len(flights))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(probability_of, first, closures) if verdict == "effect" else None,
@@ -110,10 +115,25 @@ def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
 
     def closed(rest: float) -> float:
         """Fraction of the gap above the floor that is closed when this rms is left."""
-        return float(np.clip((before - rest) / max(before - 1.0, LEAST_GAP), 0.0, 1.0)) if before > 1.0 else 0.0
+        return fraction_closed(before ** 2, rest ** 2)
 
     low, high = closed(quantile(after_each, fit.weight, HIGH)), closed(quantile(after_each, fit.weight, LOW))
     return Closure(before, after, Quantity(closed(after), min(low, closed(after)), max(high, closed(after))))
+
+
+def closes_too_little(closure: Closure) -> bool:
+    """Whether an effect closes less than LEAST_CLOSED of a gap over STANDS_OUT, too little to be its cause.
+
+    The tails of the likelihood forgive one number of the balance that is far off, however far: an effect may be much
+    more probable than the others, and leave the gap as it is.
+    """
+    return closure.before > STANDS_OUT and closure.shrink.value < LEAST_CLOSED
+
+
+def without_name(withdrawn: str, probability_of: Mapping[str, float]) -> dict[str, float]:
+    """The probabilities where a name is withdrawn: its own, of a weight that of both forms, is that of `unknown`."""
+    together = _weights_together(withdrawn, probability_of)
+    return {**together, withdrawn: 0.0, "unknown": together["unknown"] + together[withdrawn]}
 
 
 def _gap(verdict: str, closure: Closure) -> OverallGap:
@@ -128,10 +148,11 @@ def control_of(probability_of: Mapping[str, float], first: str, closures: Mappin
 
 
 def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-               ) -> list[RankedCandidate]:
+               withdrawn: str = "") -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
 
-    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured.
+    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. A name that
+    was withdrawn comes second.
     """
     together = _weights_together(first, probability_of)
     best = max(together.values())
@@ -140,6 +161,8 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
+        if name == withdrawn:
+            return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
         if name == OTHER_WEIGHT.get(first) and probability == 0.0:
             return f"counted with {first}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
@@ -150,7 +173,8 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
                                reason(name, probability), measured=is_effect)
 
-    return sorted((candidate(n, p) for n, p in together.items()), key=lambda r: (r.name != first, -r.probability))
+    return sorted((candidate(n, p) for n, p in together.items()),
+                  key=lambda r: (r.name != first, r.name != withdrawn, -r.probability))
 
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
