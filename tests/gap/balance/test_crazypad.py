@@ -74,7 +74,7 @@ def test_nominal_is_none_and_nonsense_is_unknown():
 @pytest.mark.parametrize(("number", "change"), [
     (0, -0.2), (0, -0.4), (3, 0.4), (3, -0.4)])
 def test_one_number_alone_that_is_far_off_is_no_nominal_flight(number, change):
-    """By 16 to 36 standard deviations of nominal flights, and by 15 to 50 of maintenance: nothing known makes that."""
+    """By 16 to 36 standard deviations of nominal flights, and by 15 to 50 of maintenance: no candidate makes that."""
     one = np.zeros(4)
     one[number] = change
     assert best(pattern(one))[0].name == "unknown"

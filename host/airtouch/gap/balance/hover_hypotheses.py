@@ -120,8 +120,8 @@ def moved_centre(samples: Samples, priors: Priors) -> Hypothesis:
 def nameless_changes(priors: Priors) -> list[Hypothesis]:
     """Something that changes all four numbers of the balance, each by itself, or lift or yaw alone: as probable.
 
-    Nothing with a name changes yaw alone, or makes lift alone less. Lift alone more is a weight at the centre of mass,
-    roll or pitch alone a centre of mass that moved.
+    No candidate changes yaw alone, or makes lift alone less: a weight that is taken off and more thrust are none here.
+    Lift alone more is a weight at the centre of mass, roll or pitch alone a centre of mass that moved.
     """
     from scipy.stats import qmc  # slow to import, and seldom needed
 
