@@ -71,14 +71,11 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
 
     candidates = hypotheses(vehicle, without=set(without))
     judged = evidence(pattern, base, candidates)
-    probability_of = probabilities(judged, candidates)
-    first, probability = answer_of(probability_of)
-    fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
+    by_evidence = probabilities(judged, candidates)
+    fits = {name: likeliest_of(name, candidates, judged) for name in by_evidence}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
-    withdrawn = first if first not in NO_EFFECTS and closes_too_little(closures[first]) else ""
-    if withdrawn:
-        probability_of = without_name(withdrawn, probability_of)
-        first, probability = "unknown", probability_of["unknown"]
+    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures)
+    first, probability = answer_of(probability_of)
     verdict = first if first in NO_EFFECTS else "effect"
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
@@ -89,7 +86,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
-        control=control_of(probability_of, first, closures) if verdict == "effect" else None,
+        control=control_of(by_evidence, first, closures) if verdict == "effect" else None,
         notes=_notes(voltage, [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
@@ -130,10 +127,22 @@ def closes_too_little(closure: Closure) -> bool:
     return closure.before > STANDS_OUT and closure.shrink.value < LEAST_CLOSED
 
 
-def without_name(withdrawn: str, probability_of: Mapping[str, float]) -> dict[str, float]:
-    """The probabilities where a name is withdrawn: its own, of a weight that of both forms, is that of `unknown`."""
-    together = _weights_together(withdrawn, probability_of)
-    return {**together, withdrawn: 0.0, "unknown": together["unknown"] + together[withdrawn]}
+def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
+                         ) -> tuple[dict[str, float], list[str]]:
+    """The probabilities with those of names that close too little at 0, and these names, the likeliest first.
+
+    A weight is withdrawn in both forms. If an effect that closes enough is then the likeliest, the others add up to 1;
+    if one of NO_EFFECTS is, `unknown` takes what is free.
+    """
+    left, withdrawn, free = dict(probability_of), [], 0.0
+    while (first := answer_of(left)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
+        withdrawn.append(first)
+        free += _weights_together(first, left)[first]
+        left.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in left})
+    if first in NO_EFFECTS:
+        return {**left, "unknown": left["unknown"] + free}, withdrawn
+    total = sum(left.values()) if withdrawn else 1.0
+    return {n: p / total for n, p in left.items()}, withdrawn
 
 
 def _gap(verdict: str, closure: Closure) -> OverallGap:
@@ -148,11 +157,11 @@ def control_of(probability_of: Mapping[str, float], first: str, closures: Mappin
 
 
 def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-               withdrawn: str = "") -> list[RankedCandidate]:
+               withdrawn: Sequence[str] = ()) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
 
-    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. A name that
-    was withdrawn comes second.
+    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. Names that
+    were withdrawn follow the answer.
     """
     together = _weights_together(first, probability_of)
     best = max(together.values())
@@ -161,10 +170,10 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
-        if name == withdrawn:
+        if name in withdrawn:
             return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
-        if name == OTHER_WEIGHT.get(first) and probability == 0.0:
-            return f"counted with {first}: a weight, whether its own mass shows or not"
+        if probability == 0.0 and (other := OTHER_WEIGHT.get(name)) in (first, *withdrawn):
+            return f"counted with {other}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
     def candidate(name: str, probability: float) -> RankedCandidate:
@@ -173,8 +182,9 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
                                reason(name, probability), measured=is_effect)
 
+    order = [first, *withdrawn]
     return sorted((candidate(n, p) for n, p in together.items()),
-                  key=lambda r: (r.name != first, r.name != withdrawn, -r.probability))
+                  key=lambda r: (order.index(r.name) if r.name in order else len(order), -r.probability))
 
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
