@@ -1,5 +1,6 @@
 """The answer of a hover's balance from probabilities of known size: a weight has two names, other names compete."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
+from airtouch.simulation import effects
 from gap_flights import VEHICLE, flight, noise
 
 
@@ -111,6 +113,22 @@ def test_a_name_that_leaves_the_gap_as_it_is_is_withdrawn():
     assert withdrawn.why.endswith("of the gap, too little to be its cause") and withdrawn.probability == 0.0
     assert sum(r.probability for r in result.ranking) == pytest.approx(1.0)
     assert result.gap["after"] == result.gap["before"] and not any("--effect " in s.command for s in result.next)
+
+
+def test_effects_of_ones_own_are_said_not_to_be_tried_and_are_not_advised():
+    """Nor is any other that is no candidate: the note names those that are, which are those of the ranking."""
+    nominal, odd = [hovering(seed) for seed in (1, 2, 3)], hovering(4)
+    odd = replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])
+    before = balance_result.diagnosis([odd], nominal, VEHICLE)
+    effects.register(replace(effects.get("mass"), name="made_up_magnet"))
+    try:
+        result = balance_result.diagnosis([odd], nominal, VEHICLE)
+    finally:
+        effects.unregister("made_up_magnet")
+    assert result.verdict == "unknown" and not any("--effect-file" in s.command for s in result.next)
+    assert [n for n in result.notes if n not in before.notes] == [balance_result.OWN_NOT_TRIED.format("made_up_magnet")]
+    tried = {n for n in effects.NAMES if re.search(rf"\b{n}\b", result.notes[0])}
+    assert tried == {r.name for r in result.ranking} - {"none", "unknown"}
 
 
 @pytest.mark.parametrize(("before", "shrink", "too_little"), [

@@ -11,6 +11,7 @@ import numpy as np
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.shrink import fraction_closed
+from airtouch.gap.answer.words import joined
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
@@ -34,6 +35,7 @@ from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap,
 from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
+from airtouch.simulation.effects import EFFECTS, NAMES
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
@@ -43,7 +45,8 @@ WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor")
 NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
-           "it is; candidates that leave both as they are were not tried")
+           "it is; the only effects tried are {}")
+OWN_NOT_TRIED = "effects of your own are not tried where flights have no gyro and hovers are judged: {}"
 NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
               "effect named for that")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
@@ -87,13 +90,13 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(by_evidence, first, closures) if verdict == "effect" else None,
-        notes=_notes(voltage, [*notes, *_not_logged([*flights, *nominal])]),
+        notes=_notes(voltage, list(probability_of), [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
         if pictures else None)
-    return replace(answer, next=next_steps(answer, flights, vehicle))
+    return replace(answer, next=next_steps(answer, flights, vehicle, own_effects=False))
 
 
 def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
@@ -214,9 +217,14 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | 
     return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
-def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
-    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
-    return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
+def _notes(voltage: bool, tried: Sequence[str], notes: Sequence[str]) -> tuple[str, ...]:
+    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's.
+
+    tried: names of the candidates.
+    """
+    effects, own = [n for n in tried if n not in NO_EFFECTS], [n for n in EFFECTS if n not in NAMES]
+    return (NO_GYRO.format(joined(effects)), *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
+            *([] if voltage else [NO_VOLTAGE]))
 
 
 def _not_logged(flights: Sequence[Flight]) -> list[str]:
