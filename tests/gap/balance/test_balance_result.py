@@ -53,6 +53,11 @@ def test_names_of_half_the_probability_fit_alike():
     assert alike(["mass"], {"mass": 1.0}, "mass", 1.0) == (("mass", "thrust_coefficient"),)
 
 
+def test_a_gap_without_a_name_is_not_to_be_told_from_no_effect_by_more_flights():
+    """`unknown` is no effect that others could be alike to, nor one that a step tells from none."""
+    assert alike([], {"none": 0.4, "mass": 0.1, "unknown": 0.5}, "unknown", 0.5) == ()
+
+
 def test_the_wrong_effect_of_the_control_is_improbable():
     closures = {n: Closure(3.0, 2.0, Quantity(0.5)) for n in ("com_offset", "slung_load", "mass", "weak_motor")}
     total = {"com_offset": 0.2, "slung_load": 0.05, "mass": 0.7, "weak_motor": 0.05}
