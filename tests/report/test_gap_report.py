@@ -73,6 +73,19 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_fligh
     assert title.startswith(gap_tables.in_words(result.headline))
 
 
+def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path):
+    """As those of flights without a gyro: one gap is above its floor, one is not, and neither has blocks."""
+    bare = {"low": None, "high": None, "floor_high": None, "blocks": 0}
+    cells = [replace(cell(channel, "hover", gap), **bare) for channel, gap in (("force_z", 0.3), ("torque_x", 0.05))]
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis(cells, "unknown", ()), command="x")
+    source = (tmp_path / "gap.html").read_text()
+    grey = re.findall(rf'<td[^>]* style="background:{gap_tables.AT_FLOOR.background}[^>]*>([^<]*)', source)
+    assert "1 of 2 cells over the floor" in source and grey == ["0.5×"]
+    titles = re.findall(r'<td[^>]* title="([^"]*)"', source)
+    assert len(titles) == 2 and all(t.endswith("floor 0.1 m/s^2, 1 flight") for t in titles), titles
+    assert "interval" not in source.split('id="where"')[1].split("</table>")[0]
+
+
 def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
     """Sentence, JSON and page have one shrink and one before and after; the calibrated arm is left out."""
     result = of_flights(pushed_flights)

@@ -87,12 +87,14 @@ def capital(text: str) -> str:
 
 
 def heat_map_cell(cell: Cell) -> dict[str, str]:
-    """A cell of the heat map: text, colours, and a title with gap, interval, floor and sample size."""
-    times, significant = cell.ratio, summary.significant(cell)
-    shade = next(s for s in SHADES if times >= s.least) if significant else AT_FLOOR
-    title = (f"{in_words(cell)}; interval {interval(cell) or 'not known'}, floor {short(cell.floor)} {cell.unit}, "
-             f"{cell.blocks} blocks of {cell.flights} flights")
-    after = "" if cell.after is None or not significant else f"{short(cell.ratio_after)}×"
+    """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size."""
+    times, stands_out = cell.ratio, summary.stands_out(cell)
+    shade = next(s for s in SHADES if times >= s.least) if stands_out else AT_FLOOR
+    flights = f"{cell.flights} flight{'s' * (cell.flights != 1)}"
+    title = "; ".join([in_words(cell), ", ".join(filter(None, [
+        f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
+        f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
+    after = "" if cell.after is None or not stands_out else f"{short(cell.ratio_after)}×"
     return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": shade.background,
             "ink": shade.ink, "title": title, "after": after}
 

@@ -1,5 +1,6 @@
 """The answer of a hover's balance from probabilities of known size: a weight has two names, other names compete."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
+from airtouch.simulation import effects
 from gap_flights import VEHICLE, flight, noise
 
 
@@ -49,6 +51,11 @@ def test_names_of_half_the_probability_fit_alike():
     total = {"none": 0.26, "mass": 0.5, "slung_load": 0.24, "unknown": 0.3}
     assert alike([], total, "mass", 0.5) == (("mass", "none"),)
     assert alike(["mass"], {"mass": 1.0}, "mass", 1.0) == (("mass", "thrust_coefficient"),)
+
+
+def test_a_gap_without_a_name_is_not_to_be_told_from_no_effect_by_more_flights():
+    """`unknown` is no effect that others could be alike to, nor one that a step tells from none."""
+    assert alike([], {"none": 0.4, "mass": 0.1, "unknown": 0.5}, "unknown", 0.5) == ()
 
 
 def test_the_wrong_effect_of_the_control_is_improbable():
@@ -113,6 +120,22 @@ def test_a_name_that_leaves_the_gap_as_it_is_is_withdrawn():
     assert result.gap["after"] == result.gap["before"] and not any("--effect " in s.command for s in result.next)
 
 
+def test_effects_of_ones_own_are_said_not_to_be_tried_and_are_not_advised():
+    """Nor is any other that is no candidate: the note names those that are, which are those of the ranking."""
+    nominal, odd = [hovering(seed) for seed in (1, 2, 3)], hovering(4)
+    odd = replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])
+    before = balance_result.diagnosis([odd], nominal, VEHICLE)
+    effects.register(replace(effects.get("mass"), name="made_up_magnet"))
+    try:
+        result = balance_result.diagnosis([odd], nominal, VEHICLE)
+    finally:
+        effects.unregister("made_up_magnet")
+    assert result.verdict == "unknown" and not any("--effect-file" in s.command for s in result.next)
+    assert [n for n in result.notes if n not in before.notes] == [balance_result.OWN_NOT_TRIED.format("made_up_magnet")]
+    tried = {n for n in effects.NAMES if re.search(rf"\b{n}\b", result.notes[0])}
+    assert tried == {r.name for r in result.ranking} - {"none", "unknown"}
+
+
 @pytest.mark.parametrize(("before", "shrink", "too_little"), [
     (STANDS_OUT + 0.1, LEAST_CLOSED - 0.01, True), (STANDS_OUT + 0.1, LEAST_CLOSED, False),
     (STANDS_OUT, 0.0, False), (3.0, -0.2, True)])
@@ -120,12 +143,41 @@ def test_a_gap_that_stands_out_must_close_by_a_quarter(before, shrink, too_littl
     assert balance_result.closes_too_little(Closure(before, 1.0, Quantity(shrink))) == too_little
 
 
-@pytest.mark.parametrize(("name", "kept"), [("mass", {"weak_motor": 0.1, "unknown": 0.9}),
-                                            ("weak_motor", {"mass": 0.5, "com_offset": 0.3, "unknown": 0.2})])
-def test_the_probability_of_a_name_withdrawn_is_that_of_unknown(name, kept):
-    total = {"weak_motor": 0.1, "mass": 0.5, "com_offset": 0.3, "unknown": 0.1}
-    left = balance_result.without_name(name, total)
-    assert {n: p for n, p in left.items() if p} == pytest.approx(kept)
+CLOSES = {"none": 0.0, "weak_motor": 0.74, "mass": 0.23, "slung_load": 0.1, "com_offset": 0.2, "unknown": 0.6}
+EVIDENCE = {"none": 0.05, "weak_motor": 0.3, "mass": 0.35, "slung_load": 0.15, "com_offset": 0.1, "unknown": 0.05}
+
+
+@pytest.mark.parametrize(("closes", "evidence", "names", "left"), [
+    ({}, {}, ["mass"],
+     {"none": 0.05 / 0.55, "weak_motor": 0.3 / 0.55, "slung_load": 0.15 / 0.55, "unknown": 0.05 / 0.55}),
+    ({"weak_motor": 0.2}, {}, ["mass", "weak_motor", "slung_load"], {"none": 0.05, "unknown": 0.95}),
+    ({}, {"none": 0.32, "weak_motor": 0.03}, ["mass"],
+     {"none": 0.32, "weak_motor": 0.03, "slung_load": 0.15, "unknown": 0.5}),
+    ({"mass": 0.3}, {}, [], EVIDENCE)])
+def test_a_name_withdrawn_leaves_the_answer_to_the_next_that_closes_enough(closes, evidence, names, left):
+    """Shares of what is left, by hand; where no effect comes next, `unknown` has what was withdrawn."""
+    closures = {n: Closure(3.0, 1.0, Quantity(c)) for n, c in {**CLOSES, **closes}.items()}
+    probability_of, withdrawn = balance_result.with_names_withdrawn({**EVIDENCE, **evidence}, closures)
+    assert withdrawn == names
+    assert {n: p for n, p in probability_of.items() if p} == pytest.approx(left)
+
+
+def test_two_weak_rotors_are_named_though_a_weight_is_more_probable_and_closes_little():
+    """Rotors 2 and 4 need more, 1 and 3 what they did: a weight is likelier, but makes no turn about yaw."""
+    nominal, weak = [hovering(seed, lift) for seed, lift in ((1, 0.98), (2, 1.0), (3, 1.02))], hovering(4)
+    result = balance_result.diagnosis([replace(weak, pwm=weak.pwm * [1.0, 1.1, 1.0, 1.05])], nominal, VEHICLE)
+    assert result.verdict == "effect" and {e.name for e in result.effects} == {"weak_motor"}
+    assert {e.parameters["rotor"].value for e in result.effects} <= {2.0, 4.0}
+    assert result.shrink.value > LEAST_CLOSED and sum(r.probability for r in result.ranking) == pytest.approx(1.0)
+    withdrawn = {r.name: r for r in result.ranking if r.why.endswith("too little to be its cause")}
+    assert withdrawn and all(r.probability == 0.0 and r.shrink.value < LEAST_CLOSED for r in withdrawn.values())
+    assert result.control is None or result.control.name not in withdrawn
+
+
+def test_the_other_form_of_a_weight_that_is_withdrawn_is_counted_with_it():
+    closures = {n: Closure(3.0, 2.0, Quantity(0.1)) for n in ("unknown", "mass", "com_offset")}
+    rows = balance_result.ranking_of("unknown", {"mass": 0.0, "com_offset": 0.0, "unknown": 1.0}, closures, ["mass"])
+    assert [r.name for r in rows] == ["unknown", "mass", "com_offset"] and rows[2].why.startswith("counted with mass")
 
 
 def test_a_weight_makes_the_gap_of_a_lighter_vehicle_larger():

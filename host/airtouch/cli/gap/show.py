@@ -36,9 +36,11 @@ def cell_table(cells: Iterable[Cell], title: str, width: int) -> Table:
     """A table of cells of a gap map for a terminal of a width; a column that says nothing is left out."""
     cells = list(cells)[:MOST_CELLS]
     inside = bool(cells) and not significant(cells[0])
-    table = Table(title=title, title_justify="left", caption_justify="left",
-                  caption="90 % intervals; a cell is listed when its interval clears the floor's"
-                          + ("; the first, which does not, is that of the answer" if inside else ""))
+    caption = ("90 % intervals; a cell is listed when its interval clears the floor's"
+               + ("; the first, which does not, is that of the answer" if inside else ""))
+    if cells and all(c.low is None for c in cells):
+        caption = "these cells have no interval; all of them are listed"
+    table = Table(title=title, title_justify="left", caption_justify="left", caption=caption)
     columns = [(name, text) for name, (text, least) in CELL_COLUMNS.items()
                if width >= least and any(text(cell) for cell in cells)]
     for name, _ in columns:

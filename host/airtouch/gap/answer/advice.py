@@ -22,11 +22,12 @@ MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "swee
 
 
 def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, extrapolated: bool = False,
-               ) -> tuple[NextStep, ...]:
+               own_effects: bool = True) -> tuple[NextStep, ...]:
     """The steps to take next, most useful first.
 
     answer: complete but for these steps; flights: those that were diagnosed; vehicle: as declared; extrapolated:
-    whether some were flown unlike the baseline, so that their floor is extrapolated.
+    whether some were flown unlike the baseline, so that their floor is extrapolated; own_effects: whether effects of a
+    user's own are candidates.
     """
     argument = argument_of(vehicle)
     steps = []
@@ -36,7 +37,7 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
             "of the controller.", f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL..."))
     steps += [step for group in answer.indistinguishable for step in _steps_to_tell_apart(group)]
     if answer.verdict == "unknown":
-        steps += _steps_for_open_gap(answer.headline, argument)
+        steps += _steps_for_open_gap(answer.headline, argument, own_effects)
     if answer.verdict == "effect":
         names = " and ".join(dict.fromkeys(e.name for e in answer.effects))
         always = " There it acts for the whole flight, not in its seconds alone."
@@ -91,10 +92,10 @@ def _steps_to_tell_apart(group: Sequence[str]) -> list[NextStep]:
     return steps
 
 
-def _steps_for_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
+def _steps_for_open_gap(headline: Cell | None, argument: str, own_effects: bool) -> list[NextStep]:
     """The steps for a gap that no known effect explains: more of the phase with most of it, and an effect of one's own.
 
-    argument: what `--vehicle` takes.
+    argument: what `--vehicle` takes; own_effects: whether such effects are candidates.
     """
     steps = []
     if headline is not None and headline.phase in MISSIONS:
@@ -104,8 +105,9 @@ def _steps_for_open_gap(headline: Cell | None, argument: str) -> list[NextStep]:
     elif headline is not None:
         steps.append(NextStep(
             "Repeat the same flight three times: what stays is the vehicle's, what changes is the air's."))
-    steps.append(NextStep(
-        "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
-        f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL... --effect-file mine.py",
-        ADD_AN_EFFECT))
+    if own_effects:
+        steps.append(NextStep(
+            "Write the effect that you suspect in a file of your own, and diagnose again with it among the candidates.",
+            f"airtouch gap diagnose REAL --vehicle {argument} --baseline NOMINAL... --effect-file mine.py",
+            ADD_AN_EFFECT))
     return steps

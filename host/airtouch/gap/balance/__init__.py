@@ -17,7 +17,7 @@ of a hypothesis is its prior probability times the mean over its samples of a St
 likelihood of the powers (Bayes factors: MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter
 28). The evidences of all hypotheses of one name over the sum of all is the probability of that name, and the samples
 weighted by their likelihood give its parameters (`hover_posterior`). `balance_result` fills the diagnosis, and
-withdraws a name that closes too little of the gap.
+withdraws names that close too little of the gap.
 
 Figures on recorded flights: host/docs/gap-crazypad.md.
 """

@@ -11,6 +11,7 @@ import numpy as np
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.shrink import fraction_closed
+from airtouch.gap.answer.words import joined
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
@@ -34,6 +35,7 @@ from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap,
 from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
+from airtouch.simulation.effects import EFFECTS, NAMES
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
@@ -43,7 +45,8 @@ WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor")
 NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
-           "it is; candidates that leave both as they are were not tried")
+           "it is; the only effects tried are {}")
+OWN_NOT_TRIED = "effects of your own are not tried where flights have no gyro and hovers are judged: {}"
 NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
               "effect named for that")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
@@ -71,14 +74,11 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
 
     candidates = hypotheses(vehicle, without=set(without))
     judged = evidence(pattern, base, candidates)
-    probability_of = probabilities(judged, candidates)
-    first, probability = answer_of(probability_of)
-    fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
+    by_evidence = probabilities(judged, candidates)
+    fits = {name: likeliest_of(name, candidates, judged) for name in by_evidence}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
-    withdrawn = first if first not in NO_EFFECTS and closes_too_little(closures[first]) else ""
-    if withdrawn:
-        probability_of = without_name(withdrawn, probability_of)
-        first, probability = "unknown", probability_of["unknown"]
+    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures)
+    first, probability = answer_of(probability_of)
     verdict = first if first in NO_EFFECTS else "effect"
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
@@ -89,14 +89,14 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
-        control=control_of(probability_of, first, closures) if verdict == "effect" else None,
-        notes=_notes(voltage, [*notes, *_not_logged([*flights, *nominal])]),
+        control=control_of(by_evidence, first, closures) if verdict == "effect" else None,
+        notes=_notes(voltage, list(probability_of), [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
         pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
         if pictures else None)
-    return replace(answer, next=next_steps(answer, flights, vehicle))
+    return replace(answer, next=next_steps(answer, flights, vehicle, own_effects=False))
 
 
 def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
@@ -130,10 +130,22 @@ def closes_too_little(closure: Closure) -> bool:
     return closure.before > STANDS_OUT and closure.shrink.value < LEAST_CLOSED
 
 
-def without_name(withdrawn: str, probability_of: Mapping[str, float]) -> dict[str, float]:
-    """The probabilities where a name is withdrawn: its own, of a weight that of both forms, is that of `unknown`."""
-    together = _weights_together(withdrawn, probability_of)
-    return {**together, withdrawn: 0.0, "unknown": together["unknown"] + together[withdrawn]}
+def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
+                         ) -> tuple[dict[str, float], list[str]]:
+    """The probabilities with those of names that close too little at 0, and these names, the likeliest first.
+
+    A weight is withdrawn in both forms. If an effect that closes enough is then the likeliest, the others add up to 1;
+    if one of NO_EFFECTS is, `unknown` takes what is free.
+    """
+    left, withdrawn, free = dict(probability_of), [], 0.0
+    while (first := answer_of(left)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
+        withdrawn.append(first)
+        free += _weights_together(first, left)[first]
+        left.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in left})
+    if first in NO_EFFECTS:
+        return {**left, "unknown": left["unknown"] + free}, withdrawn
+    total = sum(left.values()) if withdrawn else 1.0
+    return {n: p / total for n, p in left.items()}, withdrawn
 
 
 def _gap(verdict: str, closure: Closure) -> OverallGap:
@@ -148,11 +160,11 @@ def control_of(probability_of: Mapping[str, float], first: str, closures: Mappin
 
 
 def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-               withdrawn: str = "") -> list[RankedCandidate]:
+               withdrawn: Sequence[str] = ()) -> list[RankedCandidate]:
     """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
 
-    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. A name that
-    was withdrawn comes second.
+    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. Names that
+    were withdrawn follow the answer.
     """
     together = _weights_together(first, probability_of)
     best = max(together.values())
@@ -161,10 +173,10 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
-        if name == withdrawn:
+        if name in withdrawn:
             return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
-        if name == OTHER_WEIGHT.get(first) and probability == 0.0:
-            return f"counted with {first}: a weight, whether its own mass shows or not"
+        if probability == 0.0 and (other := OTHER_WEIGHT.get(name)) in (first, *withdrawn):
+            return f"counted with {other}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
     def candidate(name: str, probability: float) -> RankedCandidate:
@@ -173,8 +185,9 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
                                reason(name, probability), measured=is_effect)
 
+    order = [first, *withdrawn]
     return sorted((candidate(n, p) for n, p in together.items()),
-                  key=lambda r: (r.name != first, r.name != withdrawn, -r.probability))
+                  key=lambda r: (order.index(r.name) if r.name in order else len(order), -r.probability))
 
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
@@ -204,9 +217,14 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | 
     return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
-def _notes(voltage: bool, notes: Sequence[str]) -> tuple[str, ...]:
-    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's."""
-    return (NO_GYRO, *notes, *(() if voltage else (NO_VOLTAGE,)))
+def _notes(voltage: bool, tried: Sequence[str], notes: Sequence[str]) -> tuple[str, ...]:
+    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's.
+
+    tried: names of the candidates.
+    """
+    effects, own = [n for n in tried if n not in NO_EFFECTS], [n for n in EFFECTS if n not in NAMES]
+    return (NO_GYRO.format(joined(effects)), *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
+            *([] if voltage else [NO_VOLTAGE]))
 
 
 def _not_logged(flights: Sequence[Flight]) -> list[str]:

@@ -65,11 +65,12 @@ def alike(effects: Iterable[str], probability_of: Mapping[str, float], first: st
           ) -> tuple[tuple[str, ...], ...]:
     """Sets of names that the flights cannot tell apart: names of one thing, and those that COMPETE with the answer.
 
-    effects: names of the answer's; first, probability: `answer_of`.
+    effects: names of the answer's; first, probability: `answer_of`. With `unknown` nothing competes: it is no effect
+    that further flights would tell from the others.
     """
     sets = [tuple(sorted(group[0])) for name in effects if (group := names_alike(name))]
     others = [n for n in probability_of if n not in (first, "unknown") and probability_of[n] > COMPETES * probability]
-    if others:
+    if others and first != "unknown":
         sets.append(tuple(sorted({first, *others})))
     return tuple(dict.fromkeys(sets))
 

@@ -70,7 +70,7 @@ def stands_out(cell: Cell) -> bool:
     """Whether the gap lies above the interval of the floor: by its own interval, or by itself where it has none.
 
     The cells of flights without a gyro (`gap.balance`) have no interval. They may stand out, so that a headline can
-    name one, and none is `significant`: neither a list of the largest cells nor the colours of a report show them.
+    name one, and a report colours those that do; none is `significant`, which `largest` asks for.
     """
     return over_floor(cell, cell.low) > 1.0
 
