@@ -114,10 +114,11 @@ def detect(flight: "Flight", detector: "str | Detector" = "best", model: str | P
     from airtouch.detector.evaluation import evaluate as scoring
 
     module, log = registry.get(detector), read(flight)
-    scoring.check(log, scoring.spare_of(module))
+    trained = module.load(Path(model) if model else None)
+    scoring.check(log, scoring.spare_of(module), scoring.arm_pwm_by(module, trained))
     for remark in scoring.remarks(log):
         warnings.warn(f"{log.source}: {remark}", stacklevel=_caller_level())
-    return module.run(log, registry.model_for(module, module.load(Path(model) if model else None), log))
+    return module.run(log, registry.model_for(module, trained, log))
 
 
 @in_python
@@ -151,7 +152,7 @@ def evaluate(flights: "Flight | Iterable[Flight]", detector: "str | Detector" = 
     scores, left_out = scoring.evaluate(dataset.collect(paths, speed_mps), module, trained, note) if paths else ([], [])
     for log in map(read, (f for f in inputs if not isinstance(f, (str, Path)))):
         file = dataset.with_flown_speed(FlightFile(Path(log.source), Condition(speed_mps=speed_mps)), log)
-        scoring.check(log, scoring.spare_of(module))
+        scoring.check(log, scoring.spare_of(module), scoring.arm_pwm_by(module, trained))
         if scoring.truth(log) and file.condition.speed_mps is None:
             raise AirTouchError(f"{log.source}: speed unknown, so errors in metres are too: give speed_mps")
         result = scoring.evaluate_flight(file, log, module, trained)
@@ -173,14 +174,12 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
     value}} to switch on; without: names to switch off. Raises AirTouchError for an unknown name, a wrong number and a
     flight that diverges.
     """
-    from airtouch.crazyflie import mission
     from airtouch.simulation import batch
     from airtouch.simulation.flight import Diverged
 
     for name, value, least in (("flights", flights, 1), ("seed", seed, 0)):
         if not isinstance(value, numbers.Integral) or value < least:
             raise AirTouchError(f"{name} must be a whole number from {least}, not {value!r}")
-    scenario = mission.scene_or_scenario(scenario) if isinstance(scenario, str) else scenario
     logs = list(batch.flights(scenario, flights, vehicle=vehicle, effects=effects, without=without, seed=seed))
     lost = [f for f in logs if isinstance(f, Diverged)]
     if lost:
@@ -253,10 +252,11 @@ def adapt(flights: "str | Path | Iterable[str | Path]", out: str | Path, *, twin
     files = _several(flights)
     if others := [type(f).__name__ for f in files if not isinstance(f, (str, Path))]:
         raise AirTouchError(f"flights to adapt to are files or folders, not {others[0]}; airtouch.write makes a file")
+    start = best.load(None)
     usable, left_out, simulator, work = adapt_report.prepared(
         dataset.collect(files, speed_mps), out, None if twin is None else Path(twin), vehicle, speed_mps=speed_mps,
-        seed=seed, bar=_stages(progress))
-    adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=best.load(None), seed=seed,
+        seed=seed, bar=_stages(progress), start=start)
+    adapted = module.adapt(usable, simulator.scenario, simulator.vehicle, work, start=start, seed=seed,
                            hold_out=hold_out, progress=progress, command="airtouch.adapt(...)")
     adapted.model.save(out, force)
     return replace(adapted, left_out=left_out)

@@ -50,7 +50,8 @@ def test_a_mistyped_mission_gets_the_nearest():
 
 
 @pytest.mark.parametrize(("call", "typed", "message"), [
-    (scenario.load, "zig-zag", "no scenario 'zig-zag'; did you mean zigzag"),
+    (scenario.load, "zigzg", "no scenario 'zigzg'; did you mean zigzag"),
+    (scenario.load, "swep", "no scenario 'swep'; did you mean sweep"),
     (vehicle.load, "crazyflie-21", "no vehicle 'crazyflie-21'; did you mean crazyflie-2.1"),
     (registry.get, "papr", "no detector 'papr'; did you mean paper"),
     (faults.parse, "los=0.3", "no fault 'los'; did you mean loss"),

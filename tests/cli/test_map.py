@@ -76,6 +76,37 @@ def test_edges_at_which_the_position_is_lost_are_counted(tmp_path):
     assert sum(f["properties"]["role"] == "edge" for f in content["features"]) == complete - lost
 
 
+def test_columns_without_a_position_are_as_none(tmp_path):
+    log = zigzag_log()
+    empty = {"x_m": np.full(len(log), np.nan), "y_m": np.full(len(log), np.nan)}
+    logs.write(log.with_columns(empty), tmp_path / "empty.csv")
+    logs.write(zigzag_log(with_position=False), tmp_path / "without.csv")
+    assert "--speed" in str(run(tmp_path / "empty.csv", "--truth", "--out", tmp_path / "none.geojson").exception)
+    features = []
+    for name in ("empty", "without"):
+        result = run(tmp_path / f"{name}.csv", "--truth", "--speed", "0.3", "--out", tmp_path / f"{name}.geojson")
+        assert result.exit_code == 0, result.output
+        features.append(json.loads((tmp_path / f"{name}.geojson").read_text())["features"])
+    assert features[0] == features[1] and len(features[0]) > 2
+
+
+@pytest.mark.parametrize(("every", "placed"), [(10, True), (25, True), (40, False)])
+def test_positions_of_a_slower_sensor_place_the_edges_up_to_a_quarter_of_a_second_apart(tmp_path, every, placed):
+    log = zigzag_log()
+    sparse = np.arange(len(log)) % every != 3
+    logs.write(log.with_columns({name: np.where(sparse, np.nan, log[name]) for name in ("x_m", "y_m")}),
+               tmp_path / "slow.csv")
+    result = run(tmp_path / "slow.csv", "--truth", "--out", tmp_path / "map.geojson")
+    if not placed:
+        assert "no position (x_m, y_m) at any of the" in str(result.exception)
+        assert not (tmp_path / "map.geojson").exists()
+        return
+    features = json.loads((tmp_path / "map.geojson").read_text())["features"]
+    at = np.array([f["geometry"]["coordinates"] for f in features if f["properties"]["role"] == "edge"])
+    assert len(at) == len(logs.true_edges(log))
+    assert np.abs(np.abs(at[:, 0]) - 0.4).max() < 0.01  # the square's sides
+
+
 def test_without_position_the_edges_lie_along_the_track(tmp_path):
     logs.write(zigzag_log(with_position=False), tmp_path / "zigzag.csv")
     result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "map.geojson")

@@ -8,8 +8,9 @@ import pytest
 import airtouch as at
 from airtouch.crazyflie import mission
 from airtouch.errors import AirTouchError
-from airtouch.simulation import scenario
+from airtouch.simulation import batch, scenario
 from airtouch.simulation.firmware import setpoint as c
+from airtouch.sitl import Server
 
 
 def retraced(legs):
@@ -25,7 +26,7 @@ def retraced(legs):
 
 @pytest.mark.parametrize("name", [*mission.names(), "zigzag", "l-shape", "paper-mixed", "circle"])
 def test_legs_are_the_path_that_the_simulator_flies(name):
-    path = mission.shipped_folder() / f"{name}.toml"
+    path = scenario.MISSIONS / f"{name}.toml"
     scene = scenario.load(path) if path.is_file() else scenario.load(name)
     rows = scenario.draw_flight(scene, 3, 2).setpoints
     legs = mission.load(name, 3, 2).legs
@@ -34,6 +35,18 @@ def test_legs_are_the_path_that_the_simulator_flies(name):
     upto = int(100 * sum(leg.seconds for leg in legs if leg.kind not in ("land", "wait") or leg is legs[0])) - 2
     difference = path_rows[:upto] - rows[:upto, c.X:c.Z + 1] + rows[0, c.X:c.Z + 1]
     assert np.abs(difference).max() < 0.02
+
+
+@pytest.mark.parametrize("name", mission.names())
+def test_a_mission_is_a_scenario_wherever_one_is_named(name):
+    """Batches, the virtual drone and `at.simulate` fly what stands in its file."""
+    plan = scenario.draw_flight(scenario.load(scenario.MISSIONS / f"{name}.toml"), 2, 0)
+    server = Server(name, port=0, seed=2)
+    server.close()
+    np.testing.assert_array_equal(server.plan.setpoints, plan.setpoints)
+    for (log,) in (batch.simulate(name, seed=2), at.simulate(name, seed=2)):
+        assert log.meta["scenario"] == name and log.meta["condition"] == plan.values
+        assert len(log) == len(plan.setpoints)
 
 
 def test_the_mission_is_seen_from_the_start():
@@ -86,7 +99,7 @@ def test_what_cannot_be_flown_is_said_in_one_line(tmp_path):
 @pytest.mark.parametrize("name", ["sweep", "there-and-back"])
 def test_the_shipped_detector_feels_the_edges_of_a_first_flight(name):
     """Six virtual flights, drawn anew: at most every fifth edge is missed (of 20 flights: results.md)."""
-    path = mission.shipped_folder() / f"{name}.toml"
+    path = scenario.MISSIONS / f"{name}.toml"
     logs = [log.with_columns({}, speed_mps=0.3) for log in at.simulate(path, 6, seed=7)]
     score = at.evaluate(logs)
     assert score["edges"] == 6 * {"sweep": 2, "there-and-back": 4}[name]

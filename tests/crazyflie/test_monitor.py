@@ -8,6 +8,7 @@ import pytest
 from airtouch.crazyflie.connection import app_log, blocks
 from airtouch.crazyflie.connection.intake import Intake
 from airtouch.crazyflie.connection.log_blocks import Sample
+from airtouch.crazyflie.connection.ticks import Restarted
 from airtouch.crazyflie.monitor import Monitor
 from airtouch.crazyflie.view.board import Board
 from airtouch.crazyflie.view.host_detector import HostDetector
@@ -113,3 +114,25 @@ def test_the_apps_own_edges_are_shown_once_each_at_their_time():
             monitor.take([Sample(app_log.WANTED.name, 10 * k, 0.01 * k, dict(app))])
     assert [(f.kind, pytest.approx(f.at_s, abs=0.011)) for f in messages] == [("entry", 1.37)]
     assert monitor.board.detector == "best on the GAP8" and monitor.board.status == ""
+
+
+def test_an_edge_after_a_restart_is_on_the_new_track():
+    """The drone stood at x = -5 m for 30 s, restarted, and flies at x = 2 m; its app reports an edge there."""
+    monitor = Monitor(Board("test", ""), Intake(blocks.STATE), None)
+    motion, state, app = (dict.fromkeys(block.names, 0) for block in (blocks.MOTION, blocks.STATE, app_log.WANTED))
+
+    def fly(from_ms, to_ms, since_s, x_mm):
+        for ms in range(from_ms, to_ms, 10):
+            at = since_s + 0.001 * ms
+            monitor.take([Sample(blocks.STATE.name, ms, at, state | {"stateEstimateZ.x": x_mm}),
+                          Sample(blocks.MOTION.name, ms, at, motion)])
+
+    fly(1000, 31000, 0.0, -5000)
+    with pytest.raises(Restarted):
+        fly(1000, 3000, 30.0, 2000)
+    monitor.restart()
+    fly(1500, 11500, 30.0, 2000)
+    for edges in (0, 1):
+        monitor.take([Sample(app_log.WANTED.name, 11500, 41.5, app | {"airtouch.edges": edges, "airtouch.edge": 1})])
+    assert [edge.x_m for edge in monitor.board.edges] == [2.0]
+    assert monitor.board.now_s < 11.0

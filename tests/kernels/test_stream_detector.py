@@ -12,9 +12,9 @@ from airtouch import kernels as c
 from airtouch import logs
 from airtouch.detector.shared.channels import level_acceleration
 from airtouch.errors import AirTouchError
-from airtouch.kernels.library import lib
+from airtouch.kernels.library import ffi, lib
 from airtouch.logs.flight_log import GYRO, PWM
-from airtouch.reference.edge_decoder import LOGITS, DecoderConfig, edge_decoder
+from airtouch.reference.edge_decoder import LOGITS, MOST_LOOK_BACK, DecoderConfig, edge_decoder
 from airtouch.reference.motion_channels import NAMES, motion_channels
 from airtouch.reference.networks.int8_network import quantise
 from airtouch.reference.networks.stream_int8 import run_stream
@@ -100,6 +100,22 @@ def test_decoder_equals_the_reference_and_keeps_its_word(seed, n, nan, dwell, ar
     for a, b in pairwise(at):
         in_the_air = airborne[a:b + 1].all()
         assert not in_the_air or ((hold or b - a >= dwell) and edges[a] != edges[b])
+
+
+@pytest.mark.parametrize("name", ["dwell_steps", "arm_steps", "look_back", "hold_steps"])
+def test_counts_of_steps_are_those_that_both_decoders_take(name):
+    """From 0 to the most that the field in C holds, or its ring of logits: others are refused before either runs."""
+    field = "".join([name.split("_")[0], *(word.title() for word in name.split("_")[1:])])
+    bits = 8 * ffi.sizeof(dict(ffi.typeof("decoderConfig_t").fields)[field].type)
+    most = MOST_LOOK_BACK if name == "look_back" else 2**bits - 1
+    logits, airborne = np.random.default_rng(0).normal(0, 4, (500, 3)), np.ones(500, bool)
+    for steps in (0, np.int64(1), most):
+        config = DecoderConfig(**{name: steps})
+        np.testing.assert_array_equal(c.edge_decoder(logits, airborne, config),
+                                      edge_decoder(logits.astype(np.float32), airborne, config))
+    for steps in (-1, most + 1, 2.5, True, None):
+        with pytest.raises(AirTouchError, match=f"{name} is {steps}, not a whole number from 0 to {most}"):
+            DecoderConfig(**{name: steps})
 
 
 def test_an_edge_is_reported_a_fixed_time_after_the_peak_of_its_logit():

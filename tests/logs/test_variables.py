@@ -54,6 +54,18 @@ def test_an_axis_is_converted_without_the_others_of_its_group():
     assert meta == {"warnings": [], "acc_frame": "body"}
 
 
+def test_axes_of_one_column_group_may_come_from_two():
+    """The height alone was left, and the two others were lost without a warning."""
+    columns, meta = converted(stateEstimate__z=[3], stateEstimateZ__x=[1000], stateEstimateZ__y=[2000])
+    assert [columns[f"{a}_m"][0] for a in "xyz"] == [1, 2, 3] and not meta["warnings"]
+
+
+def test_an_axis_that_others_replace_is_named():
+    columns, meta = converted(acc__z=[1], stateEstimate__ax=[0.1], stateEstimate__ay=[0.2], stateEstimate__az=[0.3])
+    assert columns["acc_z_mps2"][0] == pytest.approx(1.3 * G) and meta["acc_frame"] == "world"
+    assert [w for w in meta["warnings"] if "acc.z" in w] == ["acc.z left out: other variables give acc_z_mps2"]
+
+
 def test_a_whole_group_is_taken_before_an_axis_of_another():
     both, _ = converted(stateEstimate__x=[7], stateEstimateZ__x=[1000], stateEstimateZ__y=[2000],
                         stateEstimateZ__z=[3000])

@@ -115,6 +115,16 @@ def test_wind_must_change_neither_errors_nor_misses(job, monkeypatch, calm, wind
     assert verdict(conditions.wind(job), "wind") == answer
 
 
+@pytest.mark.parametrize(("calm_missed", "best_windy_m", "answer"), [
+    (0.8, 0.03, UNTESTABLE), (0.8, 0.09, NOT_REPRODUCED), (0.2, 0.03, REPRODUCED)])
+def test_wind_is_not_tested_where_the_papers_method_misses_most_unless_best_is_worse(job, monkeypatch, calm_missed,
+                                                                                   best_windy_m, answer):
+    monkeypatch.setattr(simulated, "flights", lambda scene, count, blown=(): ["windy" if blown else "calm"] * count)
+    monkeypatch.setattr(simulated, "scores", lambda some, name: flights(0.03, calm_missed, count=800) if name == "paper"
+                        else flights(best_windy_m if some[0] == "windy" else 0.03))
+    assert verdict(conditions.wind(job), "wind") == answer
+
+
 def test_materials_are_shown_and_never_judged(job, monkeypatch):
     scores = {(name, scene): flights(0.05) for name in materials.DETECTORS for scene in materials.PAIRS}
     monkeypatch.setattr(materials, "pair_scores", lambda _: scores)

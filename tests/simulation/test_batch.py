@@ -58,6 +58,9 @@ def test_flights_do_not_depend_on_workers_or_batch():
     ({"seed": -1}, "seed must be a whole number, 0 or more, not -1"),
     ({"workers": 0}, "workers must be a whole number, 1"),
     ({"count": -3}, "the number of flights must be"), ({"count": [0, -1]}, "a flight's number must be"),
+    *(({"count": count}, "the number of flights must be a whole number, 0 or more, not ")
+      for count in (3.0, True, None, np.bool_(True), np.array(3))),
+    ({"count": [True]}, "a flight's number must be"), ({"seed": True}, "seed must be"),
     ({"count": np.array([0.5])}, "a flight's number must be"), ({"effects": {"nope": {}}}, "no effect 'nope'"),
     ({"effects": {"wind": {"x": 1e9}}}, "wind: x"), ({"without": ["nope"]}, "no effect 'nope'")])
 def test_bad_input_is_refused_at_the_call(wrong, message):

@@ -44,6 +44,23 @@ def test_a_recording_names_what_simulate_names(tmp_path):
     assert "speed" not in recorded["condition"]
 
 
+def test_a_recording_names_the_faults_with_the_times_at_which_they_began(bench, tmp_path):
+    """The battery's is a sample before that at which the logged voltage falls; one that never begins is not named."""
+    craft = bench("hover", faults=["low-battery=1", "loss=0.3,all", "gap8-silent=99"], record=tmp_path / "a.csv")
+    assert craft.high_level("<BBff?f", 7, 0, 0.5, 0.0, True, 1.5) == 0
+    for tick in range(300):
+        if tick == 50:
+            craft.server.order("late=50ms")
+        craft.server.step(lambda _: None)
+    craft.server.recorder.write()
+    log = logs.read(tmp_path / "a.csv")
+    before_fall = log["t_s"][np.argmin(np.diff(log["vbat_V"]))]
+    first, ordered = log["t_s"][0], log["t_s"][50]
+    assert log.meta["faults"] == [{"kind": "loss", "t_s": first, "amount": 0.3, "all_packets": True},
+                                  {"kind": "late", "t_s": ordered, "amount": 0.05},
+                                  {"kind": "low-battery", "t_s": before_fall}]
+
+
 def test_a_session_without_rows_writes_nothing(tmp_path):
     Recorder(tmp_path / "a.csv.gz", META, force=False).write()
     assert not list(tmp_path.iterdir())

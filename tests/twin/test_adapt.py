@@ -170,7 +170,7 @@ def test_no_flight_is_in_training_and_held_out_at_once(sweeps, tmp_path, monkeyp
 
 def trained(number, lag_s=0.2):
     """A model without a network: `number` of its training."""
-    return BestModel(None, {}, {}, b"", {"lag_s": lag_s, "number": number})
+    return BestModel(best.Recipe(), {}, {}, b"", {"lag_s": lag_s, "number": number})
 
 
 @pytest.fixture

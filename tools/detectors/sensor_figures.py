@@ -1,14 +1,17 @@
 """Writes what `best` loses where a log lacks a sensor to `host/airtouch/models/best_sensors.json`, for its notes.
 
+    AIR="--free-air ../shared/flights/neuralswarm/flights --free-air ../shared/flights/crazypad"
+    airtouch crossval $AIR --free-air ../shared/flights/imrclab --out out/folds
     python tools/detectors/choose_decoder.py out/folds --json out/all.json
-    python tools/detectors/choose_decoder.py out/any --silence motors --json out/motors.json      # and rates
+    python tools/detectors/choose_decoder.py out/folds --silence motors --json out/motors.json      # and rates
     airtouch evaluate ../shared/flights/airtouch-november --speed 0.3 --json out/november.json
     python tools/detectors/sensor_figures.py all=out/all.json=folds motors=out/motors.json=folds \\
         rates=out/rates.json=folds acceleration=out/november.json="another month"
 
-The last command only reads files, in a second. `out/folds` and `out/any` are what `airtouch crossval` kept, the
-second with --any-sensor. All figures are of flights that neither the weights nor the decoder's settings have seen; the
-text after the second = says which.
+The last command only reads files, in a second. The models in `out/folds` also serve logs without a sensor: the recipe
+silences each one in a fraction of the crops. The shipped figures are of models of 2026-11-22 (host/docs/looks.md); the
+commands are those of today. All figures are of flights that neither the weights nor the decoder's settings have seen;
+the text after the second = says which.
 """
 
 import argparse

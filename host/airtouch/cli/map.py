@@ -36,7 +36,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     airtouch map flights/airtouch/imu_data_0126-1906.csv.gz
     airtouch map zigzag.csv --out map.geojson
 
-    Positions come from x_m, y_m where the log has them; else from the commanded speed, which places edges
+    Positions come from x_m, y_m where they hold values; else from the commanded speed, which places edges
     along the track only. Each edge has a 1-sigma: the detector's timing error times the speed there.
     """
     need("map", "a map")

@@ -78,7 +78,6 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     reported with their number and never written; the exit code is then 1.
     """
     from airtouch import vehicle as vehicles
-    from airtouch.crazyflie import mission
     from airtouch.logs.files import read_text
     from airtouch.simulation import batch, effects
     from airtouch.simulation import scenario as scenarios
@@ -90,7 +89,7 @@ def command(scenario: str, flights: int, out: Path, vehicle: str, chosen: tuple[
     for path in files:
         effects.load_file(path)
         plugins.append(read_text(path))
-    scene = mission.scene_or_scenario(scenario)
+    scene = scenarios.load(scenario)
     craft = vehicles.load(vehicle)
     pairs = [effects.parse(text) for text in chosen]
     plan = scenarios.draw_flight(scene, seed, 0)

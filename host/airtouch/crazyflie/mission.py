@@ -6,7 +6,6 @@ set-points.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +77,7 @@ def _room_in_words(room_m: tuple[float, float, float, float, float]) -> str:
 
 def names() -> list[str]:
     """Names of the missions in the package."""
-    return sorted(f.name[:-5] for f in shipped_folder().iterdir() if f.name.endswith(".toml"))
+    return scenario.names(scenario.MISSIONS)
 
 
 def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
@@ -95,21 +94,11 @@ def load(name_or_path: str | Path, seed: int = 0, flight: int = 0) -> Mission:
     return Mission(scene.name, tuple(legs), plan.values, round(max(level)[1], 4) if level else None)
 
 
-def scene_or_scenario(name_or_path: str | Path) -> scenario.Scenario:
-    """`scene_of` whose error, where there is none, is the scenarios'."""
-    return scene_of(name_or_path) if str(name_or_path) in names() else scenario.load(name_or_path)
-
-
 def scene_of(name_or_path: str | Path) -> scenario.Scenario:
-    """The scenario of a built-in mission, a built-in scenario or a .toml file.
-
-    Raises AirTouchError, with similar names, if there is none.
-    """
-    if str(name_or_path) in names():
-        text = (shipped_folder() / f"{name_or_path}.toml").read_text(encoding="utf-8")
-        return scenario.parse(text, str(name_or_path))
-    if Path(name_or_path).suffix != ".toml" and str(name_or_path) not in scenario.names():
-        near = nearest(str(name_or_path), [*names(), *scenario.names()])
+    """`scenario.load`, whose error for an unknown name is that there is no such mission, with similar names."""
+    known = [*names(), *scenario.names()]
+    if Path(name_or_path).suffix != ".toml" and str(name_or_path) not in known:
+        near = nearest(str(name_or_path), known)
         raise AirTouchError(f"no mission {str(name_or_path)!r}{near} (ready ones: {', '.join(names())}, or a .toml "
                             "file)")
     return scenario.load(name_or_path)
@@ -176,8 +165,3 @@ def _speeds(legs: Sequence[Leg]) -> list[float]:
     before = [Leg("wait", 0.0, 0.0, 0.0, 0.0), *legs[:-1]]
     return [float(np.hypot(b.x_m - a.x_m, b.y_m - a.y_m)) / b.seconds
             for a, b in zip(before, legs, strict=True)]
-
-
-def shipped_folder():
-    """The folder of the missions that come with the package."""
-    return resources.files("airtouch") / "crazyflie" / "missions"

@@ -90,7 +90,8 @@ class Monitor:
         self.board.status = "; ".join([*load, *self.app.faults])
 
     def restart(self) -> None:
-        """Start again with the drone's new clock; the detector keeps its state."""
+        """Start again with the drone's new clock and an empty board; the detector keeps its state."""
+        self.board.clear()
         self.intake, self._before_ms, self._edges = Intake(self.intake.slow), None, None
 
     def refresh(self, round_trip_s: float) -> None:

@@ -14,6 +14,7 @@ from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.vehicle import arm_pwm_of
 
 CHUNK = 5  #: rows per turn of the loop, 50 ms
 
@@ -25,7 +26,7 @@ def position(log: FlightLog, speed_mps: float | None) -> dict[str, np.ndarray]:
     """
     if log.has("x_m", "y_m") or speed_mps is None:
         return {}
-    along = np.cumsum(sensors.airborne_by(log)[0]) * SAMPLE_PERIOD_S * speed_mps
+    along = np.cumsum(sensors.airborne_by(log, arm_pwm_of(log.meta))[0]) * SAMPLE_PERIOD_S * speed_mps
     return {"x_m": along, "y_m": np.zeros(len(log))}
 
 

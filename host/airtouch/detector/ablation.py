@@ -111,6 +111,6 @@ def in_float(detector: Detector, files: Sequence[FlightFile], folds: Sequence[Fo
         raise AirTouchError("this detector's network does not run in float")
     models: dict[int | str | None, Any] = {fold.fold: detector.load(out / fold.model) for fold in folds}
     float_detector = InFloatOnly(detector)
-    readable, _ = crossval.readable_flights(files, evaluate.spare_of(detector))
+    readable, _ = crossval.readable_flights(files, evaluate.spare_of(detector), arm_pwm=evaluate.arm_pwm_by(detector))
     return [evaluate.evaluate_flight(f, readable[f.path], float_detector, models[f.condition.fold]).score
             for f in files if f.path in readable]

@@ -19,6 +19,7 @@ from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, SAMPLE_PERIOD_S, Parameters
+from airtouch.vehicle import arm_pwm_of
 
 QUANTILES = (0.8, 0.9, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)  #: of |slope| that `fit` tries as thresholds; chosen
 
@@ -53,7 +54,7 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, progress: Callable[..., Non
     seed, progress: what every detector's `fit` takes; here nothing is random, and nothing takes long. Raises TypeError
     for any other option, as the baseline has none.
     """
-    truth = [logs.true_edges(log) for log in flights]
+    truth = [logs.true_edges(log, arm_pwm=arm_pwm_of(log.meta)) for log in flights]
     correlations = [correlation_sum(spectrum_power(log), Baseline.correlation_window) for log in flights]
     slopes = {s: [derivative(c, s) for c in correlations] for s in (25, 50, 100)}
     candidates = [Baseline(smoothing=smoothing, threshold=threshold)

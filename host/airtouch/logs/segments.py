@@ -34,7 +34,7 @@ def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
     Ground: motors below the airborne level, or never higher than 5 cm where a height was measured. Take-off: until
     85 % of the median height in the air; landing: from the last time at that height. A log that begins or ends in the
     air, half of the median height up or more, has no take-off or no landing there.
-    Over platform: between an entry and an exit, or the landing, by the down range. The rest is cruise
+    Over platform: from an entry to its exit by the down range, or to the landing where none follows. The rest is cruise
     where the speed is above 0.1 m/s, else hover; without velocity it is all cruise if
     the flight crosses an edge, else all hover. arm_pwm: the airborne level, of a vehicle's
     file. Raises AirTouchError for a log with neither PWM nor height.
@@ -60,9 +60,9 @@ def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
         elif measured:
             _ends(kinds[here], ground_height[here], start == 0, stop == len(log))
         descent = int(np.argmax(np.r_[kinds[here] == KINDS.index("landing"), True])) + start
-        for edge, end in zip(crossing, [*(e.sample for e in crossing[1:]), stop], strict=False):
+        for edge, end in zip(crossing, [*(e.sample for e in crossing[1:]), descent], strict=False):
             if edge.kind == "entry":
-                kinds[edge.sample:min(end, descent)] = KINDS.index("over platform")
+                kinds[edge.sample:end] = KINDS.index("over platform")
     return [Segment(KINDS[kinds[start]], start, stop) for start, stop in _constant_runs(kinds)]
 
 

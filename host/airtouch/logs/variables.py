@@ -141,13 +141,20 @@ def _acceleration(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray
 
 
 def _parts(table: Mapping[str, np.ndarray], columns: dict[str, np.ndarray], meta: dict[str, Any]) -> None:
-    """Add the logged axes of groups that have no column yet. A warning names variables that need others of theirs."""
+    """Add the logged axes that have no column yet, of groups that are not logged whole.
+
+    A warning names those whose column others gave, and variables that need others of theirs.
+    """
     for variables, names, factor in _GROUPS:
-        if variables not in _WHOLE and not any(name in columns for name in names):
-            logged = {name: table[v] * factor for v, name in zip(variables, names, strict=True) if v in table}
-            columns |= logged
-            if logged and names == ACC:
-                meta["acc_frame"] = "body"
+        if variables in _WHOLE or all(v in table for v in variables):
+            continue
+        for variable, name in zip(variables, names, strict=True):
+            if variable in table and name in columns:
+                meta["warnings"].append(f"{variable} left out: other variables give {name}")
+            elif variable in table:
+                columns[name] = table[variable] * factor
+                if names == ACC:
+                    meta["acc_frame"] = "body"
     for group in _WHOLE:
         logged_ones, missing = [v for v in group if v in table], [v for v in group if v not in table]
         if logged_ones and missing:

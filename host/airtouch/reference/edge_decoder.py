@@ -12,6 +12,7 @@ LOGITS = ("over", "entry", "exit")
 LOGIT_LIMIT = 8.0
 SMOOTHED_AT_START = -3.0  #: smoothed over logit before anything is known: over a platform with a probability of 0.05
 MOST_LOOK_BACK = 63  #: steps, the largest `look_back`: one less than EDGE_DECODER_RING in edge_decoder.h
+MOST_STEPS = 2**32 - 1  #: of the other three counts, uint32_t in decoderConfig_t
 LONG_AGO = 0x3FFFFFFF  #: steps since an edge that never was
 
 
@@ -23,7 +24,8 @@ class DecoderConfig:
     exit logit - over_share * over logit > exit_score; or late, where the over logit smoothed
     by smooth_gain a step passes late_entry upwards or late_exit downwards. The crossing is taken to be where
     the event's logit peaked within look_back steps before (or while the edge waits); the edge is reported
-    hold_steps after it, at once where that has passed. Raises AirTouchError for a look_back above MOST_LOOK_BACK.
+    hold_steps after it, at once where that has passed. Raises AirTouchError for a count of steps that is no whole
+    number from 0 to MOST_STEPS, for look_back to MOST_LOOK_BACK.
     """
 
     over_share: float = 0.5
@@ -38,8 +40,11 @@ class DecoderConfig:
     hold_steps: int = 0
 
     def __post_init__(self) -> None:
-        if self.look_back > MOST_LOOK_BACK:
-            raise AirTouchError(f"edge decoder: look_back is {self.look_back}, at most {MOST_LOOK_BACK} steps are kept")
+        for name in ("dwell_steps", "arm_steps", "look_back", "hold_steps"):
+            steps, most = getattr(self, name), MOST_LOOK_BACK if name == "look_back" else MOST_STEPS
+            whole = isinstance(steps, (int, np.integer)) and not isinstance(steps, bool)
+            if not (whole and 0 <= steps <= most):
+                raise AirTouchError(f"edge decoder: {name} is {steps!r}, not a whole number from 0 to {most}")
 
 
 @dataclass(slots=True)

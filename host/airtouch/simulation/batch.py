@@ -35,7 +35,7 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     """
     scene = scenario if isinstance(scenario, Scenario) else scenarios.load(scenario)
     craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
-    if isinstance(count, (int, np.integer)):
+    if not isinstance(count, Iterable) or getattr(count, "ndim", 1) == 0:  # NumPy's array of one number has no items
         count = range(_whole(count, "the number of flights"))
     elif isinstance(count, Sized):
         for number in count:
@@ -52,9 +52,9 @@ def flights(scenario: Scenario | str | Path, count: int | Iterable[int], *,
     return _in_order(one, numbers, workers)
 
 
-def _whole(value: int, name: str, least: int = 0) -> int:
+def _whole(value: object, name: str, least: int = 0) -> int:
     """The value as an int. Raises AirTouchError for one that is no whole number or is less than `least`."""
-    if not isinstance(value, (int, np.integer)) or value < least:
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < least:
         raise AirTouchError(f"{name} must be a whole number, {least} or more, not {value!r}")
     return int(value)
 

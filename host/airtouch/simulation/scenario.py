@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from airtouch.simulation.flight_plan.expressions import draw
 from airtouch.vehicle import RANGE_MODULES, Vehicle, check_firmware, numbers
 
 KEYS = {"name", "summary", "firmware", "range_module", "vehicle", "values", "world", "platform", "mission", "effects"}
+SCENARIOS = resources.files("airtouch") / "simulation" / "scenarios"
+MISSIONS = resources.files("airtouch") / "crazyflie" / "missions"  #: scenarios that `airtouch collect` flies too
 FIRMWARE_KEYS = ("firmware", "range_module")  #: fields of a vehicle that may stand outside [vehicle]
 #: x from, to, y from, to: walls out of the reach (4 m) of the ranging sensors
 DEFAULT_ROOM_M = (-10.0, 10.0, -10.0, 10.0)
@@ -53,14 +56,13 @@ class FlightPlan:
         return replace(vehicle, **self.changes)
 
 
-def names() -> list[str]:
-    """Names of the package's scenarios."""
-    folder = resources.files("airtouch") / "simulation" / "scenarios"
+def names(folder: Traversable = SCENARIOS) -> list[str]:
+    """Names of the package's scenarios, or of its missions: folder is SCENARIOS or MISSIONS."""
     return sorted(f.name[:-5] for f in folder.iterdir() if f.name.endswith(".toml"))
 
 
 def load(name_or_path: str | Path) -> Scenario:
-    """A built-in scenario by name, or a TOML file by path. Raises AirTouchError in one line."""
+    """A built-in scenario or mission by name, or a TOML file by path. Raises AirTouchError in one line."""
     if not isinstance(name_or_path, (str, Path)):
         raise AirTouchError(f"a scenario is a name, a .toml file or an object, not {name_or_path!r}")
     path = Path(name_or_path)
@@ -68,11 +70,11 @@ def load(name_or_path: str | Path) -> Scenario:
         if not path.is_file():
             raise AirTouchError(f"{path}: no such scenario file")
         text = path.read_text(encoding="utf-8", errors="replace")
-    elif str(name_or_path) in names():
-        folder = resources.files("airtouch") / "simulation" / "scenarios"
-        text = (folder / f"{name_or_path}.toml").read_text(encoding="utf-8")
     else:
-        raise unknown("scenario", str(name_or_path), names(), ", or a .toml file")
+        folders = {name: folder for folder in (SCENARIOS, MISSIONS) for name in names(folder)}
+        if str(name_or_path) not in folders:
+            raise unknown("scenario", str(name_or_path), folders, ", or a .toml file")
+        text = (folders[str(name_or_path)] / f"{name_or_path}.toml").read_text(encoding="utf-8")
     return parse(text, str(name_or_path))
 
 

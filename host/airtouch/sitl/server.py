@@ -38,7 +38,7 @@ LINK_TIMEOUT_S = 1.0  #: s without a link after which the firmware deletes its l
 class Server:
     """The virtual Crazyflie. `run` serves until `stop`; clients connect to `uri`.
 
-    scenario, vehicle: names, files or objects. effects, without: as in `airtouch simulate`. The drone
+    scenario (or mission), vehicle: names, files or objects. effects, without: as in `airtouch simulate`. The drone
     stands at the start of the scenario's mission. speed: multiple of real time. faults: texts or
     `Fault`s. record: file of the flight log, written at the end.
     Raises AirTouchError for settings that cannot be flown, a port in use and a `record` that exists.
@@ -53,7 +53,7 @@ class Server:
             raise AirTouchError("speed must be above 0 and at most 100")
         scene = scenario if isinstance(scenario, scenarios.Scenario) else scenarios.load(scenario)
         craft = vehicle if isinstance(vehicle, Vehicle) else vehicles.load(vehicle or vehicles.DEFAULT_VEHICLE)
-        self.faults = [fault if isinstance(fault, Fault) else parse(fault) for fault in faults]
+        ordered = [fault if isinstance(fault, Fault) else parse(fault) for fault in faults]
         self.plan = scenarios.draw_flight(scene, seed, flight)
         active = choose(self.plan, effects, without)
         self.drone = Drone(self.plan, craft, seed, flight, active, ai_deck)
@@ -65,8 +65,11 @@ class Server:
         self.speed = speed
         self.client: crtp.Peer | None = None
         rng = np.random.default_rng([seed, flight, 11])
-        self._up, self._down = Line(self.faults, rng), Line(self.faults, rng)
-        self._todo = [f for f in self.faults if f.kind not in LINE]
+        self._up, self._down = Line((), rng), Line((), rng)
+        self.faults: list[Fault] = []
+        self._todo: list[Fault] = []
+        for fault in ordered:
+            self.order(fault)
         self._cut_until_s = -math.inf
         self._stop = threading.Event()
         self._socket = _bind(host, port)
@@ -81,6 +84,7 @@ class Server:
         if fault.kind in LINE:
             self._up.add(fault)
             self._down.add(fault)
+            self._record(fault)
         else:
             self._todo.append(fault)
 
@@ -139,6 +143,7 @@ class Server:
             if fault.at_s > -math.inf and (since is None or now_s < since + fault.at_s):
                 continue
             self._todo.remove(fault)
+            self._record(fault)
             if fault.kind == "disconnect":
                 self._cut_until_s = now_s + fault.amount
                 self._up.clear()
@@ -151,6 +156,11 @@ class Server:
                 drone.app.gap8_silent = True
             else:
                 drone.drain()
+
+    def _record(self, fault: Fault) -> None:
+        """Name a fault that begins now in the recording."""
+        if self.recorder:
+            self.recorder.add_fault(fault, self.drone.now_s)
 
     def _receive(self) -> None:
         """Put all received datagrams onto the simulated link."""

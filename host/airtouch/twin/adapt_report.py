@@ -19,20 +19,20 @@ from airtouch.twin.recorded.course import course
 from airtouch.vehicle import Vehicle
 
 
-def readable(files: Sequence[FlightFile], speed_mps: float = 0.3,
+def readable(files: Sequence[FlightFile], speed_mps: float = 0.3, start: best.BestModel | None = None,
              progress: Callable[[int, int], None] = lambda *_: None,
              ) -> tuple[list[LoadedFlight], list[tuple[str, str]]]:
     """Flights that can be used, and (path, reason) of the others.
 
-    A speed that is not stated comes from the log; speed_mps, m/s, where the log has no platform. progress: as
-    progress(done, total).
+    A speed that is not stated comes from the log; speed_mps, m/s, where the log has no platform. start: the model that
+    is trained further, None for none. progress: as progress(done, total).
     """
     usable, left_out = [], []
     for number, file in enumerate(files):
         progress(number + 1, len(files))
         try:
             log = logs.read(file.path)
-            evaluate.check(log, best.SPARE_SENSORS)
+            evaluate.check(log, best.SPARE_SENSORS, best.arm_pwm(start))
             speed = file.condition.speed_mps
             if speed is None and evaluate.truth(log):
                 try:
@@ -53,15 +53,16 @@ def check_vehicle(twin: object, vehicle: object) -> None:
 
 
 def prepared(files: Sequence[FlightFile], out: Path, twin: Path | None, vehicle: Vehicle | str | Path | None, *,
-             speed_mps: float | None, seed: int, bar: calibrate.Bars, note: Callable[[str], None] = lambda _: None,
+             speed_mps: float | None, seed: int, bar: calibrate.Bars, start: best.BestModel | None = None,
+             note: Callable[[str], None] = lambda _: None,
              ) -> tuple[list[LoadedFlight], list[tuple[str, str]], calibrate.Twin, Path]:
     """The flights to adapt to, (path, reason) of the others, the twin, and the folder of finished stages beside `out`.
 
-    twin: its folder, else one is fitted, from a vehicle. note: called with each reason. Raises AirTouchError where no
-    flight can be used.
+    twin: its folder, else one is fitted, from a vehicle. start: as in `readable`. note: called with each reason. Raises
+    AirTouchError where no flight can be used.
     """
     with bar("reading") as step:
-        usable, left_out = readable(files, progress=lambda done, total: step(done, total, ""))
+        usable, left_out = readable(files, start=start, progress=lambda done, total: step(done, total, ""))
     for _, reason in left_out:
         note(reason)
     if not usable:

@@ -185,6 +185,12 @@ def test_the_note_has_the_measured_figures():
     assert first < text.index(f"{all_sensors['missed']:.1%} missed of")
     assert "\n" not in text
     assert not sensor_note.note((), shipped=True)
+    log = made_flight(0)
+    one_axis = FlightLog({name: log[name] for name in log.columns if not name.startswith("acc_") or "_z_" in name}, {})
+    absent = sensors.missing_sensors(one_axis)
+    columns = sensors.columns_missing_in_part(one_axis, absent)
+    assert sensor_note.note(absent, False, columns) == "acceleration without acc_x_mps2, acc_y_mps2 in this log"
+    assert not sensors.columns_missing_in_part(sensors.without(log, ("acceleration",)), absent)
     assert set(sensor_note.figures()) == {"all", *sensors.SENSORS}
 
 

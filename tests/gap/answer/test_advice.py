@@ -46,6 +46,14 @@ def test_none_asks_for_nothing_to_be_added():
     assert step.text.startswith("Nothing to add") and not step.command
 
 
+@pytest.mark.parametrize(("groups", "baseline", "gyro"), [
+    ((("none", "slung_load"),), BASELINE, True), ((), (), True), ((), BASELINE, False)])
+def test_none_that_leaves_something_to_do_does_not_say_that_there_is_nothing(groups, baseline, gyro):
+    answer = replace(diagnosis(verdict="none", effects=()), baseline=baseline, indistinguishable=groups)
+    steps = next_steps(answer, WITH_GYRO if gyro else [SimpleNamespace(rates=None)], VEHICLE)
+    assert steps and not any("Nothing to add" in step.text for step in steps)
+
+
 def test_none_with_a_floor_that_is_extrapolated_asks_for_another_baseline():
     answer = replace(diagnosis(verdict="none", effects=()), baseline=BASELINE, indistinguishable=())
     (step,) = next_steps(answer, WITH_GYRO, VEHICLE, extrapolated=True)

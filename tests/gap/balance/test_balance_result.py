@@ -10,6 +10,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
+from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
 from gap_flights import VEHICLE, flight, noise
 
@@ -85,3 +86,50 @@ def test_without_the_shift_of_the_centre_a_weight_loads_all_rotors_alike():
     thrust = np.repeat(1.0 + drawn["fraction"][:, None], 4, axis=1)
     assert name == "mass"
     np.testing.assert_allclose(weight.change, commanded_change(thrust), atol=1e-12)
+
+
+def test_where_no_effect_is_named_nothing_closes_the_gap():
+    """Commands that no known effect asks for: no cell has a gap that is left with it."""
+    nominal = [hovering(seed) for seed in (1, 2, 3)]
+    odd = hovering(4)
+    result = balance_result.diagnosis([replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])], nominal, VEHICLE)
+    plain = result.plain()
+    assert result.verdict == "unknown" and plain["gap"]["after"] == plain["gap"]["before"] > 10.0
+    assert not any("after" in cell for cell in [*plain["where"], *plain["map"], plain["headline"]])
+    shrink = {r["name"]: r["shrink"] for r in plain["ranking"]}
+    for name in ("none", "unknown"):
+        assert (shrink[name]["value"], shrink[name].get("measured")) == (0.0, False)
+    assert "measured" not in shrink["weak_motor"]
+
+
+def test_a_name_that_leaves_the_gap_as_it_is_is_withdrawn():
+    """Two rotors need more and a third one less, which no candidate makes: the likeliest closes hardly anything."""
+    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.98), (2, 1.0), (3, 1.02))], hovering(4)
+    result = balance_result.diagnosis([replace(odd, pwm=odd.pwm * [1.15, 1.0, 1.15, 0.85])], nominal, VEHICLE)
+    unknown, withdrawn = result.ranking[:2]
+    assert (result.verdict, result.effects, unknown.name) == ("unknown", (), "unknown")
+    assert withdrawn.why.endswith("of the gap, too little to be its cause") and withdrawn.probability == 0.0
+    assert sum(r.probability for r in result.ranking) == pytest.approx(1.0)
+    assert result.gap["after"] == result.gap["before"] and not any("--effect " in s.command for s in result.next)
+
+
+@pytest.mark.parametrize(("before", "shrink", "too_little"), [
+    (STANDS_OUT + 0.1, LEAST_CLOSED - 0.01, True), (STANDS_OUT + 0.1, LEAST_CLOSED, False),
+    (STANDS_OUT, 0.0, False), (3.0, -0.2, True)])
+def test_a_gap_that_stands_out_must_close_by_a_quarter(before, shrink, too_little):
+    assert balance_result.closes_too_little(Closure(before, 1.0, Quantity(shrink))) == too_little
+
+
+@pytest.mark.parametrize(("name", "kept"), [("mass", {"weak_motor": 0.1, "unknown": 0.9}),
+                                            ("weak_motor", {"mass": 0.5, "com_offset": 0.3, "unknown": 0.2})])
+def test_the_probability_of_a_name_withdrawn_is_that_of_unknown(name, kept):
+    total = {"weak_motor": 0.1, "mass": 0.5, "com_offset": 0.3, "unknown": 0.1}
+    left = balance_result.without_name(name, total)
+    assert {n: p for n, p in left.items() if p} == pytest.approx(kept)
+
+
+def test_a_weight_makes_the_gap_of_a_lighter_vehicle_larger():
+    """A weight asks for more lift, and here less is flown: what it closes is below 0, not 0."""
+    result = balance_result.diagnosis([hovering(4, 0.9)], [hovering(seed) for seed in (1, 2, 3)], VEHICLE)
+    assert result.gap["before"] > 2.0
+    assert all(r.shrink.value < 0.0 for r in result.ranking if r.name in ("mass", "slung_load"))

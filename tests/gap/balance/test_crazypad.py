@@ -7,6 +7,7 @@ from airtouch import vehicle
 from airtouch.gap.balance.hover_balance import ANSWER, POWER, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses, weight_change
 from airtouch.gap.balance.hover_pattern import HoverPattern
+from airtouch.gap.balance.hover_posterior import answer_of, probabilities
 from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs import read
@@ -68,6 +69,23 @@ def test_nominal_is_none_and_nonsense_is_unknown():
     assert explanation.name == "none"
     explanation, _ = best(pattern([-0.3, 0.3, -0.3, 0.3], power=(0.4, 0.3)))
     assert explanation.name == "unknown"
+
+
+@pytest.mark.parametrize(("number", "change"), [
+    (0, -0.2), (0, -0.4), (3, 0.4), (3, -0.4)])
+def test_one_number_alone_that_is_far_off_is_no_nominal_flight(number, change):
+    """By 16 to 36 standard deviations of nominal flights, and by 15 to 50 of maintenance: nothing known makes that."""
+    one = np.zeros(4)
+    one[number] = change
+    assert best(pattern(one))[0].name == "unknown"
+
+
+@pytest.mark.parametrize("fraction", [0.12, 0.2, 0.25])
+def test_more_lift_alone_is_a_weight_at_the_centre(fraction):
+    change = weight_change(np.array([fraction]), np.zeros(1), np.zeros(1), FLOWN.arm_m)[0]
+    candidates = hypotheses(FLOWN)
+    of_each = probabilities(evidence(pattern(change), NOMINAL, candidates), candidates)
+    assert answer_of(of_each)[0] == "mass" and of_each["unknown"] < 0.05
 
 
 def test_power_that_corrections_of_the_estimate_cause_is_nobodys():

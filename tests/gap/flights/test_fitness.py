@@ -49,7 +49,8 @@ def test_a_motor_at_its_limit_a_height_that_is_held_and_a_simulated_battery_are_
     assert not without_bad_columns(hover(m1_pwm=np.full(SAMPLES, 65535.0), vbat_V=np.full(SAMPLES, 3.7)))[1]
 
 
-@pytest.mark.parametrize(("columns", "words"), [(PWM, "no motor commands"), (ACC, "no accelerations")])
+@pytest.mark.parametrize(("columns", "words"), [
+    (PWM, r"no motor commands \(m1_pwm\);"), (ACC, r"no accelerations \(acc_x_mps2\);")])
 def test_a_log_without_motors_or_accelerations_is_refused(columns, words):
     with pytest.raises(AirTouchError, match=words):
         without_bad_columns(hover(**{columns[0]: np.full(SAMPLES, np.nan)}))

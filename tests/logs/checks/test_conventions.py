@@ -46,6 +46,21 @@ def test_wrong_units_are_a_fault_and_no_diagnosis(factors, column, remedy):
         without_bad_columns(log)
 
 
+def test_angles_and_gyro_both_in_degrees_are_told():
+    """Each turns as far as the other, so that their ratio says nothing; a pitch of 4.6 rad says it all."""
+    degrees = swaying(dict.fromkeys((*GYRO, *ATTITUDE), 180.0 / np.pi))
+    told = wrong_units(degrees, FLYING)
+    for column in ("roll_rad is beyond", "pitch_rad is beyond", *(f"{gyro} turns 5" for gyro in GYRO)):
+        assert any(line.startswith(column) and "multiplied by pi/180" in line for line in told), column
+    assert len(told) == 5
+    angles = wrong_units(swaying(dict.fromkeys(ATTITUDE, 180.0 / np.pi)), FLYING)
+    assert angles and not any("gyro" in line for line in angles), "this gyro is in rad/s"
+    many_turns = swaying().with_columns({"yaw_rad": swaying()["yaw_rad"] + T,  # counted on beyond one turn
+                                           "gyro_z_radps": swaying()["gyro_z_radps"] + 1.0})
+    upside_down = swaying().with_columns({"roll_rad": swaying()["roll_rad"] + np.pi - 0.1})
+    assert not wrong_units(many_turns, FLYING) and not wrong_units(upside_down, FLYING)
+
+
 def test_a_rate_of_the_wrong_sign_is_the_first_note():
     log = swaying({"gyro_y_radps": -1.0, "gyro_z_radps": 0.0})
     _, notes = without_bad_columns(log)

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from airtouch import logs
+from airtouch.detector.evaluation.evaluate import remarks
 from airtouch.logs.checks.clock import lost_samples, true_period
+from airtouch.logs.checks.quality import summary
 from airtouch.logs.flight_log import ACC, GYRO, PWM, FlightLog
 
 
@@ -60,6 +62,23 @@ def test_lost_samples_are_told_from_bursts():
     assert [(g.sample, g.lost) for g in lost_samples(arrival, period)] == [(1000, 17), (2483, 1)]
 
 
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.31, 0.45])
+def test_every_lost_sample_of_an_even_clock_is_counted(share):
+    """With 31 % lost, a twentieth of them was counted, and the rate was 69 Hz: the losses stretched the period."""
+    whole = sound_flight()
+    there = np.random.default_rng(5).random(len(whole)) >= share
+    there[-40:] = True  # too near the end to be sure
+    log = FlightLog({name: values[there] for name, values in whole.columns.items()}, whole.meta)
+    report = logs.check(log)
+    assert report.lost == np.count_nonzero(~there[np.argmax(there):])
+    assert report.rate_hz == pytest.approx(100, rel=1e-6)
+    resampled = logs.resample(log).meta["resampled"]
+    assert resampled["lost_samples"] == report.lost and resampled["from_hz"] == pytest.approx(100, rel=1e-6)
+    told = [line for line in remarks(log) if "were lost" in line]
+    assert told == [f"{report.lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were"]
+    assert not remarks(whole)
+
+
 def test_rows_lost_in_the_air_are_no_ground():
     log = sound_flight()
     segments = logs.segments(log)
@@ -107,6 +126,21 @@ def test_a_flight_cut_high_in_the_air_has_no_take_off_and_no_landing(begins_m, e
         PWM, np.r_[np.zeros(100), np.full(800, 40000.0), np.zeros(100)])
     whole = logs.segments(log.with_columns(standing))
     assert [s.kind for s in whole] == ["ground", "take-off", "hover", "landing", "ground"]
+
+
+def test_a_platform_crossed_on_a_lower_leg_is_no_landing():
+    """Most of the flight is at 1.0 m; the platform of 0.5 m is crossed at 0.6 m, from 21 to 24 s."""
+    time = 0.01 * np.arange(3000)
+    height = np.interp(time, [1, 3, 18, 19, 27, 29], [0.0, 1.0, 1.0, 0.6, 0.6, 0.0])
+    columns = {"t_s": time, "zrange_m": np.where((time > 21) & (time < 24), height - 0.5, height)}
+    columns |= dict.fromkeys(PWM, np.where((time > 0.9) & (time < 29.2), 40000.0 + np.arange(3000) % 9, 0.0))
+    segments = logs.segments(FlightLog(columns, {"source": "made", "warnings": []}))
+    assert [(s.start, s.stop) for s in segments if s.kind == "over platform"] == [(2101, 2400)]
+
+
+def test_a_group_of_channels_is_there_with_any_axis():
+    part = FlightLog({name: values for name, values in sound_flight().columns.items() if "_x_" not in name}, {})
+    assert summary(part)["channels"] == ["acc", "gyro", "pwm", "range"]
 
 
 def test_a_down_range_without_a_value_is_not_the_ground():

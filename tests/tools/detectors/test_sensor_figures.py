@@ -1,10 +1,12 @@
 """The figures of a missing sensor: only of flights that the model did not know, and of every sensor."""
 
 import json
+import re
 import sys
 
 import pytest
 
+from airtouch.cli import airtouch
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from tools.detectors import sensor_figures
@@ -25,6 +27,12 @@ def score(tmp_path):
 def write(monkeypatch, out, *pairs):
     monkeypatch.setattr(sys, "argv", ["sensor_figures.py", *pairs, "--out", str(out)])
     sensor_figures.main()
+
+
+def test_the_help_names_options_that_there_are():
+    known = {name for command in ("crossval", "evaluate") for option in airtouch.get_command(None, command).params
+             for name in option.opts}
+    assert set(re.findall("--[a-z-]+", sensor_figures.__doc__)) <= known
 
 
 def test_the_notes_have_the_figures_that_they_name(score):

@@ -30,7 +30,7 @@ def test_flights_of_no_fold_are_trained_on(tmp_path):
 class Shortened(tuple):
     """(scenario, least share of a length), with the name and the table that a scenario has."""
 
-    name, table = "short", {}
+    name, table = "short", scenario.load("hover").table
 
 
 @pytest.fixture

@@ -44,11 +44,12 @@ def command(flight: Path, speed: float, flown_at: float | None, model: Path | No
     if len(files) != 1 or flight.is_dir() and not is_bag(flight):
         raise AirTouchError(f"{flight}: give one flight, not a folder")
     try:
-        log = evaluate.read_flight(files[0], evaluate.spare_of(best))
+        trained = best.load(model)
+        log = evaluate.read_flight(files[0], evaluate.spare_of(best), evaluate.arm_pwm_by(best, trained))
     except AirTouchError as error:
         raise AirTouchError(str(error).replace("--speed", "--flown-at")) from None
     file = dataset.with_flown_speed(files[0], log)
-    detector = HostDetector(best.load(model), sensors.missing_sensors(log))
+    detector = HostDetector(trained, sensors.missing_sensors(log))
     board = boards.Board(flight.name, "best", detector.lag_s)
     with stopping(quiet=True) as stop, screen(bool(speed)) as (show, say):
         fed = replay.run(log, board, detector, speed=speed, speed_mps=file.condition.speed_mps, stop=stop,

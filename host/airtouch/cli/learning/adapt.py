@@ -61,7 +61,8 @@ def command(flights: tuple[Path, ...], out: Path, twin_folder: Path | None, vehi
     start = None if origin == "scratch" else best.load(None if origin == "shipped" else Path(origin))
     files = in_folds(dataset.collect(flights, speed), folds)
     usable, _, twin, work = adapt_report.prepared(files, out, twin_folder, vehicle, speed_mps=speed, seed=seed, bar=Bar,
-                                                  note=lambda reason: click.echo(f"airtouch: {reason}", err=True))
+                                                  start=start, note=lambda reason: click.echo(f"airtouch: {reason}",
+                                                                                              err=True))
     labelled = [f for f in usable if f.labelled]
     click.echo(f"{len(labelled)} flights that their down range labels, {len(usable) - len(labelled)} without; "
                f"{twin.what}")

@@ -91,7 +91,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
     began = time.monotonic()
     if not simulated:
-        training, failures = _read(flights, evaluate.spare_of(module))
+        training, failures = _read(flights, evaluate.spare_of(module), _arm_pwm(module, options))
     checkpoints = out.with_suffix(".training")
     if detector == "best" and any(checkpoints.glob("*")):
         click.echo(f"{checkpoints}: kept by a stopped training; what it did with the same flights and options is not "
@@ -150,9 +150,19 @@ def _progress_bars() -> Iterator[Callable[[str, int, int, str], None]]:
         yield progress
 
 
-def _read(paths: tuple[Path, ...], spare: int) -> tuple[list[FlightLog], int]:
-    """The logs that can be trained on with at most `spare` sensors missing, and the number of the others."""
-    logs, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False)
+def _arm_pwm(module: registry.Detector, options: dict[str, Any]) -> float | None:
+    """`evaluate.arm_pwm_by` of the model to train: by --vehicle, else by the model to start from."""
+    craft = options.get("vehicle")
+    return craft.arm_pwm if craft else evaluate.arm_pwm_by(module, options.get("start"))
+
+
+def _read(paths: tuple[Path, ...], spare: int, arm_pwm: float | None) -> tuple[list[FlightLog], int]:
+    """The logs that can be trained on with at most `spare` sensors missing, and the number of the others.
+
+    arm_pwm: as in `evaluate.check`.
+    """
+    logs, left_out = crossval.readable_flights(dataset.collect(paths or (need_flights(),)), spare, scored=False,
+                                               arm_pwm=arm_pwm)
     for _, reason in left_out:
         click.echo(f"airtouch: {reason}", err=True)
     training, failures = list(logs.values()), len(left_out)

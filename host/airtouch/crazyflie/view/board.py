@@ -93,6 +93,11 @@ class Board:
             if len(self._track) > MOST_TRACK:
                 self._track = thinned(self._track[:-DENSE_TRACK]) + self._track[-DENSE_TRACK:]
 
+    def clear(self) -> None:
+        """Forget signals, track and edges: their times are of a clock that begins again."""
+        for values in (*self._signals.values(), self._track, self.edges):
+            values.clear()
+
     def add_edge(self, kind: str, at_s: float, probability: float) -> ReportedEdge:
         """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""
         known = [p for p in self._track if np.isfinite(p[1])]

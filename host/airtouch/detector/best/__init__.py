@@ -20,6 +20,7 @@ from airtouch.detector.best.detector import (
     KINDS,
     SPARE_SENSORS,
     TIMING_SIGMA_S,
+    arm_pwm,
     flight_events,
     lag_s,
     load,
@@ -35,5 +36,5 @@ from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.recipe import Recipe
 
 __all__ = ["DECODER", "DECODER_WITHOUT", "FINE_TUNING", "KINDS", "SPARE_SENSORS", "TIMING_SIGMA_S", "BestModel",
-           "FitSettings", "Recipe", "fit", "flight_events", "lag_s", "load", "model_for", "parameters",
+           "FitSettings", "Recipe", "arm_pwm", "fit", "flight_events", "lag_s", "load", "model_for", "parameters",
            "pseudo_labels", "run", "run_float", "trace_of", "with_lag"]

@@ -12,6 +12,7 @@ from airtouch.detector.evaluation.score import over_platform
 from airtouch.detector.shared import sensors
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import CHANNEL_TABLE, NAMES, MotionConfig
+from airtouch.vehicle import arm_pwm_of
 
 #: Sign of each column in a left-right mirror: y forces, roll and yaw rates, roll and yaw of the motors turn.
 MIRROR = np.array([*(channel.mirror for channel in CHANNEL_TABLE), 1], dtype=np.float32)
@@ -49,17 +50,22 @@ def channels_of(log: FlightLog, motion: MotionConfig | None = None) -> tuple[np.
 
 
 def flight_of(log: FlightLog, recipe: Recipe, edges: Sequence[logs.Edge] | None = None) -> TrainingFlight:
-    """A log as a training flight; its edges are those of its down range unless given.
+    """A log as a training flight; its edges are those of its down range (`edges_of`) unless given.
 
     Flights that pass over the platform at 4 cm or more are drawn more often.
     """
     x, airborne = channels_of(log, recipe.motion)
-    edges = logs.true_edges(log) if edges is None else edges
+    edges = edges_of(log, recipe) if edges is None else edges
     high = any(e.kind == "entry" and e.height_after_m >= 0.04 for e in edges)
     silent = {channel for sensor in sensors.missing_sensors(log) for channel in sensors.CHANNELS_OF[sensor]}
     return TrainingFlight(x, training_targets(over_platform(edges, len(log)), edges, recipe),
                           np.array([e.sample for e in edges], dtype=int), airborne, recipe.balance if high else 1.0,
                           tuple(sorted(silent)))
+
+
+def edges_of(log: FlightLog, recipe: Recipe) -> list[logs.Edge]:
+    """The edges of a log's down range, in the air by the recipe's vehicle, else by the one that the log names."""
+    return logs.true_edges(log, arm_pwm=recipe.vehicle.arm_pwm if recipe.vehicle else arm_pwm_of(log.meta))
 
 
 def batch(flights: Sequence[TrainingFlight], recipe: Recipe, rng: np.random.Generator,

@@ -87,7 +87,8 @@ def trace_of(log: FlightLog, model: BestModel, logits: np.ndarray, edge: np.ndar
         edges.append(Detection(int(i), KINDS[kind], float(crossing[kind - 1][max(i - recent, 0):i + 1].max())))
     signals = {"logits": logits} if absent else {"channels": nine_channels(log), "logits": logits}
     return Trace(np.where(airborne, over, 0.0), edges, signals,
-                 sensor_note.note(absent, bool(absent) and model_file.is_shipped(model, absent)))
+                 sensor_note.note(absent, bool(absent) and model_file.is_shipped(model, absent),
+                                  sensors.columns_missing_in_part(log, absent)))
 
 
 def flight_events(log: FlightLog, model: BestModel) -> StreamEvents:
@@ -109,6 +110,11 @@ def load(path: Path | None) -> BestModel:
 def lag_s(model: BestModel | None) -> float:
     """The lag learnt in training, seconds."""
     return float((model or load(None)).metadata["lag_s"])
+
+
+def arm_pwm(model: BestModel | None) -> float:
+    """Mean PWM above which the model takes the vehicle to be in the air: of the vehicle that it was trained for."""
+    return (model or load(None)).recipe.motion.arm_pwm
 
 
 def parameters(model: BestModel | None) -> dict[str, Any]:

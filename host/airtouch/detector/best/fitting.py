@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch import __version__, logs
 from airtouch.detector.best import detector
-from airtouch.detector.best.batches import TrainingFlight, flight_of
+from airtouch.detector.best.batches import TrainingFlight, edges_of, flight_of
 from airtouch.detector.best.fit_settings import Examples, FitSettings, Labelled, Progress
 from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.recipe import Recipe
@@ -64,7 +64,7 @@ def with_lag(model: BestModel, *groups: Labelled) -> BestModel:
     A group: logs, and the edges of each, None where its down range shows them.
     """
     for flights, labels in groups:
-        pairs = [(logs.true_edges(log) if edges is None else edges, detector.run(log, model).edges)
+        pairs = [(edges_of(log, model.recipe) if edges is None else edges, detector.run(log, model).edges)
                  for log, edges in zip(flights, labels, strict=True)]
         lag = tuning.lag(pairs, np.nan)
         if np.isfinite(lag):

@@ -209,5 +209,7 @@ def _check_metadata(model: BestModel, source: str) -> None:
     own = model.metadata.get("decoder_without", {})
     if not isinstance(own, dict):
         raise AirTouchError(f"{source}: decoder settings are not a table; {archive.REMEDY}")
-    for config in (model.decoder, *(model.decoder_without((sensor,)) for sensor in own)):
-        archive.check_settings(asdict(config), asdict(DecoderConfig()), source)
+    for table in (model.metadata.get("decoder"), *own.values()):
+        archive.check_settings(table, asdict(DecoderConfig()), source)
+    for missing in ((), *((sensor,) for sensor in own)):
+        model.decoder_without(missing)  # raises for a name that no decoder has

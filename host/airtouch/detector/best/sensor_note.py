@@ -18,13 +18,17 @@ def figures() -> dict[str, dict[str, Any]]:
     return json.loads((resources.files("airtouch") / "models" / FILE).read_text(encoding="utf-8"))
 
 
-def note(missing: Sequence[str], shipped: bool) -> str:
-    """One line on what is lost without these sensors; "" if none is missing. Only the shipped model was measured."""
+def note(missing: Sequence[str], shipped: bool, columns: Sequence[str] = ()) -> str:
+    """One line on what is lost without these sensors; "" if none is missing. Only the shipped model was measured.
+
+    columns: those that are missing of a sensor that is logged in part.
+    """
     if not missing:
         return ""
+    lack = f"{missing[0]} without {', '.join(columns)} in this log" if columns else f"no {missing[0]} in this log"
     if not shipped:
-        return f"no {missing[0]} in this log"
-    return f"no {missing[0]} in this log: {_text(figures()[missing[0]])}; with all sensors {_text(figures()['all'])}"
+        return lack
+    return f"{lack}: {_text(figures()[missing[0]])}; with all sensors {_text(figures()['all'])}"
 
 
 def _text(entry: dict[str, Any]) -> str:

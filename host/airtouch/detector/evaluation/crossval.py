@@ -103,7 +103,7 @@ def crossval(name: str, files: Sequence[FlightFile], out: Path, settings: Settin
         raise AirTouchError(f"{name} has no physical filter to switch off")
     folds = by_fold(files) if folds is None else folds
     make_folder(out)
-    readable, left_out = readable_flights(files, evaluate.spare_of(detector))
+    readable, left_out = readable_flights(files, evaluate.spare_of(detector), arm_pwm=evaluate.arm_pwm_by(detector))
     scores: list[FlightScore] = []
     done: list[Fold] = []
     for fold, members in folds.items():
@@ -141,17 +141,18 @@ def _score_fold(settings: Settings, detector: Detector, train: Sequence[FlightLo
             "cpu_seconds": round(time.process_time() - cpu_before, 1), "per_flight": [s.as_dict() for s in results]}
 
 
-def readable_flights(files: Sequence[FlightFile], spare: int = 0,
-                     scored: bool = True) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
+def readable_flights(files: Sequence[FlightFile], spare: int = 0, scored: bool = True, arm_pwm: float | None = None,
+                     ) -> tuple[dict[Path, FlightLog], list[tuple[str, str]]]:
     """(usable logs by path, the other files each with the reason). Up to `spare` sensors may be missing.
 
-    scored: whether the logs are to be scored in metres too, so that their speed must be known.
+    scored: whether the logs are to be scored in metres too, so that their speed must be known. arm_pwm: as in
+    `evaluate.check`.
     """
     logs: dict[Path, FlightLog] = {}
     left_out = []
     for file in files:
         try:
-            log = evaluate.read_flight(file, spare) if scored else evaluate.read_usable(file, spare)
+            log = (evaluate.read_flight if scored else evaluate.read_usable)(file, spare, arm_pwm)
             if evaluate.truth(log) is None:
                 raise AirTouchError(f"{file.path}: no down range in this log, so no true edges to train on")
             logs[file.path] = log

@@ -23,9 +23,11 @@ from airtouch.detector.shared import sensors
 from airtouch.detector.trace import Detection
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge, true_edges
+from airtouch.logs.alignment import HOLD_S
 from airtouch.logs.checks.clock import sample_period
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
+from airtouch.vehicle import arm_pwm_of
 
 ASSUMED_SIGMA_S = 0.1  #: s, timing error of a detection by a model that states none
 TRUE_SIGMA_S = 0.01  #: s, timing error of an edge of the down range: one sample
@@ -98,8 +100,8 @@ class TimedEdges:
 
 
 def true_edges_of(log: FlightLog) -> TimedEdges:
-    """The edges of the down range."""
-    return TimedEdges(true_edges(log), 0.0, TRUE_SIGMA_S)
+    """The edges of the down range, in the air by the vehicle that the log names."""
+    return TimedEdges(true_edges(log, arm_pwm=arm_pwm_of(log.meta)), 0.0, TRUE_SIGMA_S)
 
 
 def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = None) -> TimedEdges:
@@ -108,8 +110,9 @@ def detected_edges(log: FlightLog, detector: str = "best", model: Path | None = 
     Raises AirTouchError for an unknown detector, a model that is not its own, and a log that lacks what it needs.
     """
     module = registry.get(detector)
-    evaluate.check(log, evaluate.spare_of(module))
-    trained = registry.model_for(module, module.load(model), log)
+    loaded = module.load(model)
+    evaluate.check(log, evaluate.spare_of(module), evaluate.arm_pwm_by(module, loaded))
+    trained = registry.model_for(module, loaded, log)
     return TimedEdges(module.run(log, trained).edges, module.lag_s(trained), _sigma_s(trained, log))
 
 
@@ -130,7 +133,8 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
     """The map of the edges that were found in a flight, by a detector with a lag or in the down range.
 
     sigma_s: timing error of an edge, s. speed_mps, heading_deg: for dead reckoning, where the log has no position; only
-    distances from the first edge mean something then, and that is the origin. Raises as `track` does.
+    distances from the first edge mean something then, and that is the origin. Raises as `track` does, and where the log
+    has a position at none of the edges.
     """
     xy, measured = track(log, speed_mps, heading_deg)
     period = sample_period(log)
@@ -140,23 +144,38 @@ def edge_map(log: FlightLog, edges: Sequence[Edge | Detection], *, lag_s: float 
                          lag_s=lag_s)
     position = "logged" if measured else "dead reckoning, from the first edge"
     placed = [p for p in points if p.has_position]
+    if points and not placed:
+        raise AirTouchError(f"{log.source}: no position (x_m, y_m) at any of the {len(points)} edges; without these "
+                            "columns, --speed places the edges along the track")
     return EdgeMap(xy, placed, platforms(points), position, lag_s, sigma_s, len(points) - len(placed))
 
 
 def track(log: FlightLog, speed_mps: float | None = None, heading_deg: float = 0.0) -> tuple[np.ndarray, bool]:
     """The flown track, shape (n, 2), metres, and whether it was measured.
 
-    Logged x_m, y_m where there are any; else dead reckoning at constant speed along one heading,
-    which places edges relative to each other along the track, and nowhere else.
+    Logged x_m, y_m where they hold a value, NaN where there is none for more than HOLD_S; else dead reckoning at
+    constant speed along one heading, which places edges relative to each other along the track, and nowhere else.
     Raises AirTouchError if there is neither.
     """
     if log.has("x_m", "y_m"):
-        return log.stack(("x_m", "y_m")), True
+        xy = log.stack(("x_m", "y_m"))
+        logged = np.flatnonzero(np.isfinite(xy).all(axis=1))
+        if len(logged):
+            return _without_short_gaps(xy, logged, HOLD_S / sample_period(log)), True
     if speed_mps is None:
         raise AirTouchError(f"{log.source}: no position (x_m, y_m) in this log; give the speed: --speed 0.2")
     along = np.arange(len(log)) * sample_period(log) * speed_mps
     heading = np.radians(heading_deg)
     return np.column_stack((along * np.cos(heading), along * np.sin(heading))), False
+
+
+def _without_short_gaps(xy: np.ndarray, logged: np.ndarray, most_rows: float) -> np.ndarray:
+    """The track (n, 2) with straight lines between logged rows (k,) that are at most `most_rows` apart."""
+    apart = np.diff(logged)
+    rows = np.arange(logged[0], logged[-1])[np.repeat(apart <= most_rows, apart)]
+    filled = xy.copy()
+    filled[rows] = np.column_stack([np.interp(rows, logged, column[logged]) for column in xy.T])
+    return filled
 
 
 def edge_points(

@@ -26,6 +26,7 @@ from airtouch.vehicle import arm_pwm_of
 
 SHORTEST_S = 4.0  #: s: the windows of the band power (2 s) and of the network (1 s), and one second in the air
 LONG_HOLE_S = 1.0  #: s without a sample, the window of the network, from which a hole gets a remark
+MOST_LOST = 0.01  #: share of all samples that may be lost without a remark: that of a clean flight of `collect`
 MOST_MISSING = 0.1  #: share of a channel's samples that may be NaN, which hold the last value; chosen
 
 
@@ -38,19 +39,19 @@ class Result:
     score: FlightScore
 
 
-def read_flight(file: FlightFile, spare: int = 0) -> FlightLog:
-    """A log that can be scored; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
-    log = read_usable(file, spare)
+def read_flight(file: FlightFile, spare: int = 0, arm_pwm: float | None = None) -> FlightLog:
+    """A log that can be scored; arguments as in `check`. Raises AirTouchError with the reason and the remedy."""
+    log = read_usable(file, spare, arm_pwm)
     if truth(log) and with_flown_speed(file, log).condition.speed_mps is None:
         raise AirTouchError(f"{file.path}: speed unknown, so errors in metres are too: "
                             "give --speed, or speed_mps in a manifest.csv beside the flight")
     return log
 
 
-def read_usable(file: FlightFile, spare: int = 0) -> FlightLog:
-    """A log that a detector can use; `spare` as in `check`. Raises AirTouchError with the reason and the remedy."""
+def read_usable(file: FlightFile, spare: int = 0, arm_pwm: float | None = None) -> FlightLog:
+    """A log that a detector can use; arguments as in `check`. Raises AirTouchError with the reason and the remedy."""
     log = logs.read(file.path)
-    check(log, spare)
+    check(log, spare, arm_pwm)
     return log
 
 
@@ -59,11 +60,22 @@ def spare_of(detector: Detector) -> int:
     return getattr(detector, "SPARE_SENSORS", 0)
 
 
-def check(log: FlightLog, spare: int = 0) -> None:
+def arm_pwm_by(detector: Detector, model: Any = None) -> float | None:
+    """Mean PWM above which a detector with this model reports edges: its arm_pwm; None where it has none of its own.
+
+    It then goes by the vehicle that the log names.
+    """
+    own = getattr(detector, "arm_pwm", None)
+    return own(model) if own else None
+
+
+def check(log: FlightLog, spare: int = 0, arm_pwm: float | None = None) -> None:
     """Raise AirTouchError, one line with the remedy, for a log that a detector cannot use.
 
-    spare: sensors of the three that the detector can do without (`spare_of`).
+    spare: sensors of the three that the detector can do without (`spare_of`). arm_pwm: mean PWM above which it takes
+    the vehicle to be in the air (`arm_pwm_by`); that of the log's vehicle for None.
     """
+    arm_pwm = arm_pwm_of(log.meta) if arm_pwm is None else arm_pwm
     period = sample_period(log)
     if abs(period - SAMPLE_PERIOD_S) > 0.02 * SAMPLE_PERIOD_S:
         raise AirTouchError(f"{log.source}: logged at {1 / period:.4g} Hz, the detectors need 100 Hz: "
@@ -81,8 +93,9 @@ def check(log: FlightLog, spare: int = 0) -> None:
         if missing > MOST_MISSING:
             raise AirTouchError(f"{log.source}: {name} is missing (NaN) in {missing:.0%} of the samples; "
                                 "log the flight again or leave it out")
-    flying, evidence = sensors.airborne_by(log)
-    if flies_below(log) or np.count_nonzero(flying) * SAMPLE_PERIOD_S < 1.0:  # the detectors go by the motors alone
+    flying, evidence = sensors.airborne_by(log, arm_pwm)
+    airborne_s = 0.0 if flies_below(log, arm_pwm) else np.count_nonzero(flying) * SAMPLE_PERIOD_S
+    if airborne_s < 1.0:  # the detectors go by the motors alone
         raise AirTouchError(f"{log.source}: no flight in this log (less than 1 s of {evidence})")
     used = np.where(finite, channels, 0.0)[flying]
     for name, values, logged in zip(names, used.T, finite[flying].T, strict=True):
@@ -100,11 +113,14 @@ def remarks(log: FlightLog) -> list[str]:
     back = int((clock_steps(log) < 0).sum())
     clock = [f"the clock runs backwards {back} times; rows are taken in their order"] if back else []
     time_s = log["t_s"] if log.has("t_s") else np.empty(0)
-    holes = [g for g in lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S) if g.seconds >= LONG_HOLE_S]
+    gaps = lost_samples(time_s, true_period(time_s) or SAMPLE_PERIOD_S)
+    holes, lost = [g for g in gaps if g.seconds >= LONG_HOLE_S], sum(g.lost for g in gaps)
     if holes and not back:
         longest = max(holes, key=lambda g: g.seconds)
         clock.append(f"no sample in {longest.seconds:.2f} s before sample {longest.sample}; rows are taken as if there "
                      "were no hole")
+    if lost > MOST_LOST * (len(log) + lost) and not back:
+        clock.append(f"{lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were")
     return [str(w) for w in log.meta.get("warnings", [])] + clock
 
 
@@ -152,7 +168,8 @@ def evaluate(
     left_out: list[tuple[str, str]] = []
     for file in files:
         try:
-            result = evaluate_flight(file, read_flight(file, spare_of(detector)), detector, model)
+            log = read_flight(file, spare_of(detector), arm_pwm_by(detector, model))
+            result = evaluate_flight(file, log, detector, model)
         except AirTouchError as error:
             left_out.append((str(file.path), str(error)))
             on_result(error)

@@ -146,7 +146,8 @@ def tune(model: Model, flights: Sequence[FlightLog], physical_filter: bool = Tru
     for log in flights:
         features = flight_features(log)
         inputs.append((probability_of(model, features.fused), features.armed, features.alert))
-    settings, lag, score = choose_decoding(inputs, [logs.true_edges(log) for log in flights], physical_filter)
+    truth = [logs.true_edges(log, arm_pwm=vehicles.arm_pwm_of(log.meta)) for log in flights]
+    settings, lag, score = choose_decoding(inputs, truth, physical_filter)
     return replace(model, metadata={
         **model.metadata, "parameters": asdict(settings), "lag_s": lag, "physical_filter": physical_filter,
         "tuned_on": [os.path.basename(log.source) for log in flights], "tuned_timed_f1": score})

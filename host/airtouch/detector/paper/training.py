@@ -21,6 +21,7 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.network import infer_float, infer_int8
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT
+from airtouch.vehicle import arm_pwm_of
 
 if TYPE_CHECKING:
     import keras
@@ -78,7 +79,8 @@ def train_paper(flights: Sequence[FlightLog], seed: int = 0, recipe: PaperRecipe
     features = features_of(flights, report)
     scale = None
     if recipe.fixed_scale:
-        scale = normalisation.fit([f.fused[logs.airborne(log)] for log, f in zip(flights, features, strict=True)])
+        scale = normalisation.fit([f.fused[logs.airborne(log, arm_pwm_of(log.meta))]
+                                   for log, f in zip(flights, features, strict=True)])
     windows = join([windows_of(log, f, i, scale) for i, (log, f) in enumerate(zip(flights, features, strict=True))])
     validation = held_out(len(flights), seed)
     in_training = ~np.isin(windows.flight, validation)
@@ -128,9 +130,10 @@ def windows_of(log: FlightLog, features: Features, index: int = 0, scale: normal
                rows: int = DEFAULT.feature_window) -> Windows:
     """The training windows of one flight, `rows` samples each, z-scored by themselves or on a fixed scale."""
     x, ends = feature_windows(features.fused, rows, scale)
-    flying = logs.airborne(log)[ends]
+    arm_pwm = arm_pwm_of(log.meta)
+    flying = logs.airborne(log, arm_pwm)[ends]
     x, ends = x[flying], ends[flying]
-    over = over_platform(logs.true_edges(log), len(log))
+    over = over_platform(logs.true_edges(log, arm_pwm=arm_pwm), len(log))
     return Windows(x, over[ends].astype(np.float32), features.alert[ends].astype(np.float32),
                    np.full(len(ends), index, np.int32))
 

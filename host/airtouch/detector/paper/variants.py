@@ -21,6 +21,7 @@ from airtouch.errors import AirTouchError
 from airtouch.kernels.network import infer_float, platform_probability
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import DEFAULT, Parameters
+from airtouch.vehicle import arm_pwm_of
 
 CONVERGED = 0.01  #: share above the lowest held-out loss that counts as converged
 
@@ -53,8 +54,9 @@ class Variant:
         converged = int(np.flatnonzero(np.array(losses) <= (1 + CONVERGED) * min(losses))[0]) + 1
         unseen = [flights[i] for i in validation] or list(flights)
         model = VariantModel(network, DEFAULT, 0.0, converged)
-        settings, lag, _ = choose_decoding([self._decoding_inputs(log, model) for log in unseen],
-                                           [logs.true_edges(log) for log in unseen], self.physical_filter)
+        truth = [logs.true_edges(log, arm_pwm=arm_pwm_of(log.meta)) for log in unseen]
+        settings, lag, _ = choose_decoding([self._decoding_inputs(log, model) for log in unseen], truth,
+                                           self.physical_filter)
         return replace(model, settings=settings, lag_s=lag)
 
     def run(self, log: FlightLog, model: "VariantModel | None" = None) -> Trace:

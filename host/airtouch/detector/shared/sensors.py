@@ -50,6 +50,12 @@ def missing_sensors(log: FlightLog) -> tuple[str, ...]:
     return tuple(sensor for sensor in SENSORS if not log.has(*required_columns(log, sensor)))
 
 
+def columns_missing_in_part(log: FlightLog, absent: Sequence[str]) -> list[str]:
+    """The columns that the log lacks of those absent sensors, of SENSORS, of which it holds others."""
+    parts = [required_columns(log, sensor) for sensor in absent]
+    return [name for columns in parts if any(map(log.has, columns)) for name in columns if not log.has(name)]
+
+
 def signals(log: FlightLog, rates_before: np.ndarray | Sequence = ()) -> Signals:
     """The log's signals, with rest or level flight in place of one missing sensor.
 

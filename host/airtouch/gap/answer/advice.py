@@ -13,8 +13,8 @@ from airtouch.simulation.effects import EFFECTS, source_of
 from airtouch.vehicle import Vehicle, argument_of
 
 #: what tells an effect from none, which flights without a gyro alone may leave open
-MORE_FLIGHTS = ("hover again, and hover in more nominal flights for the baseline: the more of both, the smaller the "
-                "difference that shows")
+MORE_FLIGHTS = ("hover in more nominal flights for the baseline: the more there are, the smaller the difference that "
+                "shows")
 ADD_AN_EFFECT = "An effect of your own"  #: heading of the page that says how
 URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
 #: by phase, the mission with most of it; take-off and landing are in every one
@@ -44,13 +44,12 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
             f"Switch on {names} with these parameters in the simulator, and fly it again."
             + always * any(e.seconds for e in answer.effects),
             simulate_command(answer.effects, argument)))
-    if answer.verdict == "none":
+    if answer.verdict == "none" and extrapolated:
         steps.append(NextStep(
-            "Fly the baseline like the test: the floor is extrapolated to the test, and may hide an effect."
-            if extrapolated else "Nothing to add; longer flights would lower the floor."))
+            "Fly the baseline like the test: the floor is extrapolated to the test, and may hide an effect."))
     if any(f.rates is None for f in flights):
         steps.append(NextStep("Log the gyro: it shows torque at every frequency."))
-    return tuple(steps)
+    return tuple(steps) or (NextStep("Nothing to add; longer flights would lower the floor."),)
 
 
 def simulate_command(effects: Sequence[NamedEffect], vehicle: str) -> str:

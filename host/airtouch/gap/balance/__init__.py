@@ -10,13 +10,14 @@ log10 power of two motions, unsteadiness of the commands and heave.
 
     rotor r lost a share l of its thrust     its command is 1 / (1 - l) of what it was: lift, roll, pitch, yaw change
     weight of a share m of the mass at x, y  log(1 + m), m' y / d, -m' x / d, 0, with m' = m / (1 + m), d: rotor's x, y
-    a nameless change                        four independent normal numbers
+    a nameless change                        four independent normal numbers, or lift (less) or yaw alone
 
 **What is compared** (`hover_balance`). The flights' mean b and powers, less those of the nominal flights. The evidence
 of a hypothesis is its prior probability times the mean over its samples of a Student likelihood of b, times the normal
 likelihood of the powers (Bayes factors: MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter
 28). The evidences of all hypotheses of one name over the sum of all is the probability of that name, and the samples
-weighted by their likelihood give its parameters (`hover_posterior`). `balance_result` fills the diagnosis.
+weighted by their likelihood give its parameters (`hover_posterior`). `balance_result` fills the diagnosis, and
+withdraws a name that closes too little of the gap.
 
 Figures on recorded flights: host/docs/gap-crazypad.md.
 """

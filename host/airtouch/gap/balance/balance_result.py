@@ -10,6 +10,7 @@ import numpy as np
 
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
+from airtouch.gap.answer.shrink import fraction_closed
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
@@ -27,6 +28,7 @@ from airtouch.gap.balance.hover_posterior import (
 )
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
+from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
 from airtouch.gap.signals.spectra import MOST_LOST
@@ -38,7 +40,7 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 #: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen, those that a
 #: hover shows (`signature.WRONG` has others)
 WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
-LEAST_GAP = 1e-9  #: least gap above the floor of which a fraction is taken
+NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
            "it is; candidates that leave both as they are were not tried")
@@ -71,16 +73,20 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     judged = evidence(pattern, base, candidates)
     probability_of = probabilities(judged, candidates)
     first, probability = answer_of(probability_of)
-    verdict = first if first in ("none", "unknown") else "effect"
     fits = {name: likeliest_of(name, candidates, judged) for name in probability_of}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
+    withdrawn = first if first not in NO_EFFECTS and closes_too_little(closures[first]) else ""
+    if withdrawn:
+        probability_of = without_name(withdrawn, probability_of)
+        first, probability = "unknown", probability_of["unknown"]
+    verdict = first if first in NO_EFFECTS else "effect"
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
-    cells = _cells(gap, base, vehicle, fits[first], len(flights))
+    cells = _cells(gap, base, vehicle, fits[first] if effects else None, len(flights))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(probability_of, first, closures) if verdict == "effect" else None,
@@ -109,10 +115,25 @@ def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
 
     def closed(rest: float) -> float:
         """Fraction of the gap above the floor that is closed when this rms is left."""
-        return float(np.clip((before - rest) / max(before - 1.0, LEAST_GAP), 0.0, 1.0)) if before > 1.0 else 0.0
+        return fraction_closed(before ** 2, rest ** 2)
 
     low, high = closed(quantile(after_each, fit.weight, HIGH)), closed(quantile(after_each, fit.weight, LOW))
     return Closure(before, after, Quantity(closed(after), min(low, closed(after)), max(high, closed(after))))
+
+
+def closes_too_little(closure: Closure) -> bool:
+    """Whether an effect closes less than LEAST_CLOSED of a gap over STANDS_OUT, too little to be its cause.
+
+    The tails of the likelihood forgive one number of the balance that is far off, however far: an effect may be much
+    more probable than the others, and leave the gap as it is.
+    """
+    return closure.before > STANDS_OUT and closure.shrink.value < LEAST_CLOSED
+
+
+def without_name(withdrawn: str, probability_of: Mapping[str, float]) -> dict[str, float]:
+    """The probabilities where a name is withdrawn: its own, of a weight that of both forms, is that of `unknown`."""
+    together = _weights_together(withdrawn, probability_of)
+    return {**together, withdrawn: 0.0, "unknown": together["unknown"] + together[withdrawn]}
 
 
 def _gap(verdict: str, closure: Closure) -> OverallGap:
@@ -127,8 +148,12 @@ def control_of(probability_of: Mapping[str, float], first: str, closures: Mappin
 
 
 def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-               ) -> list[RankedCandidate]:
-    """Every candidate, best first. A weight's two forms count as one where one of them is the answer."""
+               withdrawn: str = "") -> list[RankedCandidate]:
+    """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
+
+    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. A name that
+    was withdrawn comes second.
+    """
     together = _weights_together(first, probability_of)
     best = max(together.values())
 
@@ -136,12 +161,20 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
+        if name == withdrawn:
+            return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
         if name == OTHER_WEIGHT.get(first) and probability == 0.0:
             return f"counted with {first}: a weight, whether its own mass shows or not"
         return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
 
-    return sorted((RankedCandidate(n, p, closures[n].shrink, reason(n, p)) for n, p in together.items()),
-                  key=lambda r: (r.name != first, -r.probability))
+    def candidate(name: str, probability: float) -> RankedCandidate:
+        """A candidate's row."""
+        is_effect = name not in NO_EFFECTS
+        return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
+                               reason(name, probability), measured=is_effect)
+
+    return sorted((candidate(n, p) for n, p in together.items()),
+                  key=lambda r: (r.name != first, r.name != withdrawn, -r.probability))
 
 
 def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
@@ -152,17 +185,22 @@ def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[s
     return {**probability_of, first: probability_of[first] + probability_of[other], other: 0.0}
 
 
-def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest, flights: int) -> tuple[Cell, ...]:
-    """The gap (4,) of BALANCE as lift and angular accelerations in hover, largest over the floor first."""
+def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | None, flights: int,
+           ) -> tuple[Cell, ...]:
+    """The gap (4,) of BALANCE as lift and angular accelerations in hover, largest over the floor first.
+
+    fit: of the effects named, None where none is: the cells then have no `after`.
+    """
     half_side, lift = vehicle.arm_m / np.sqrt(2.0), vehicle.mass_kg * vehicle.gravity_mps2
     inertia = vehicle.inertia_kg_m2
     unit = np.array([vehicle.gravity_mps2, lift * half_side / inertia[0], lift * half_side / inertia[1],
                      lift * vehicle.yaw_torque_over_thrust_m / inertia[2]])  # of each entry in its channel's unit
-    after = gap - fit.change
+    after = None if fit is None else np.abs(gap - fit.change) * unit
     floor = np.sqrt(base.variance[BALANCE])
     channels = (("force_z", "m/s^2"), *((f"torque_{a}", "rad/s^2") for a in "xyz"))
     cells = [Cell(c, BAND_HZ, "hover", float(abs(gap[i]) * unit[i]), float(floor[i] * unit[i]), u,
-                  flights=flights, after=float(abs(after[i]) * unit[i])) for i, (c, u) in enumerate(channels)]
+                  flights=flights, after=None if after is None else float(after[i]))
+             for i, (c, u) in enumerate(channels)]
     return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 

@@ -62,7 +62,7 @@ def hypotheses(vehicle: Vehicle, priors: Priors = PRIORS, without: Collection[st
         weight = replace(centred, effects=centred.effects[:1])
     candidates = [*no_effect(), *weak_rotors(samples, priors), weight,
                   weight_on_thread(samples, priors, vehicle.mass_kg), moved_centre(samples, priors),
-                  nameless_change(priors)]
+                  *nameless_changes(priors)]
     return [h for h in candidates if h.name not in without]
 
 
@@ -117,13 +117,19 @@ def moved_centre(samples: Samples, priors: Priors) -> Hypothesis:
     return Hypothesis("com_offset", PRIOR_PROBABILITY["com_offset"], (effect,), change, STEADY)
 
 
-def nameless_change(priors: Priors) -> Hypothesis:
-    """Something that changes all four numbers of the balance, each by itself."""
+def nameless_changes(priors: Priors) -> list[Hypothesis]:
+    """Something that changes all four numbers of the balance, each by itself, or lift or yaw alone: as probable.
+
+    Nothing with a name changes yaw alone, or makes lift alone less. Lift alone more is a weight at the centre of mass,
+    roll or pitch alone a centre of mass that moved.
+    """
     from scipy.stats import qmc  # slow to import, and seldom needed
 
-    normal = ndtri(np.clip(qmc.Sobol(4, seed=UNKNOWN_SEED).random(SAMPLES), *QUANTILES))
-    return Hypothesis("unknown", PRIOR_PROBABILITY["unknown"], (("unknown", {}),), priors.unknown * normal,
-                      priors.damaged)
+    change = priors.unknown * ndtri(np.clip(qmc.Sobol(4, seed=UNKNOWN_SEED).random(SAMPLES), *QUANTILES))
+    lift, _, _, yaw = np.eye(4)
+    changes = [change, -np.abs(change) * lift, change * yaw]
+    return [Hypothesis("unknown", PRIOR_PROBABILITY["unknown"] / len(changes), (("unknown", {}),), c, priors.damaged)
+            for c in changes]
 
 
 def commanded_change(thrust: np.ndarray) -> np.ndarray:

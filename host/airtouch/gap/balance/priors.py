@@ -53,7 +53,7 @@ class Priors:
     damaged: unsteadiness and heave with a damaged rotor, rounded from CrazyPAD's building conditions (`python
     tools/diagnosis/gap_crazypad.py FLIGHTS --corrections`): 18 of rotors 0.12 +- 0.25 and -0.20 +- 0.19. Four of
     weights, on tape or a thread, -0.03 +- 0.11 and 0.07 +- 0.10, which is nothing: a weight is STEADY.
-    unknown: standard deviation of each number of the balance under a nameless change; chosen.
+    unknown: standard deviation of each number of the balance that a nameless change changes; chosen.
     """
 
     nominal: tuple[float, ...] = (0.012, 0.011, 0.011, 0.014, 0.2, 0.2)

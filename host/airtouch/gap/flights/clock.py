@@ -19,8 +19,6 @@ PERIOD_TOLERANCE = 0.02
 BACKWARDS_S = 0.05  #: step back of the clock that is no jitter: such a log is refused; chosen
 #: most rows with the lost ones, else the clock column is at fault: so many for each logged one, and some more; chosen
 MOST_ROWS_EACH, MOST_ROWS_MORE = 3, 1000
-ALIKE = 0.02  #: share of the median step by which a step may differ from one or more of it; chosen
-MOST_ALIKE = 0.7  #: share of the steps, of one period or more, from which the mean of those of one is it; chosen
 LEAST_JITTER_S = 2e-4  #: s, rms of a clock that nothing disturbs: a jitter below it says nothing; chosen
 MISSING = 1.5  #: step, in periods, from which a row is missing: nearer to two periods than to one
 
@@ -39,7 +37,7 @@ def at_100_hz(log: FlightLog, name: str) -> FlightLog:
             raise AirTouchError(f"{name}, sample {known[first + 1]}: the clock runs backwards by "
                                 f"{-steps[first]:.3f} s; cut the log there")
     time = interpolate_missing(log["t_s"]) if log.has("t_s") else np.arange(len(log)) * sample_period(log)
-    period = _period(time)
+    period = true_period(time) or PERIOD_S
     # lost rows lengthen the mean step, not the median
     least_period = min(period, float(np.median(np.diff(time))))
     if least_period > (1.0 + PERIOD_TOLERANCE) * PERIOD_S:
@@ -65,7 +63,7 @@ def with_lost_rows(log: FlightLog, name: str) -> RegularLog:
     if not log.has("t_s"):
         return RegularLog(log, np.zeros(n), np.zeros(n, bool))
     time = interpolate_missing(log["t_s"])
-    period = _period(time)
+    period = true_period(time) or PERIOD_S
     place = np.arange(n)  # of each logged row among all
     for hole in lost_samples(time, period):
         place[hole.sample:] += hole.lost
@@ -106,16 +104,3 @@ def _rows_in_doubt(time: np.ndarray, period: float) -> int:
     """Rows at the end after which too few follow to say whether rows before them were lost or these came late."""
     steps = np.flatnonzero(np.diff(time[-LEAST_AFTER - 1:]) > MISSING * period)
     return min(len(time), LEAST_AFTER) - int(steps[0]) if len(steps) else 0
-
-
-def _period(time: np.ndarray) -> float:
-    """The clock's period, s: the median step where most are one or more of it, however many samples were lost."""
-    steps = np.diff(time)
-    median = float(np.median(steps)) if len(steps) else 0.0
-    if median > 0.0:
-        with np.errstate(over="ignore"):
-            periods = np.maximum(np.round(steps / median), 1.0)  # more than one where rows were lost
-        alike = np.abs(steps - periods * median) < ALIKE * median
-        if alike.mean() > MOST_ALIKE:
-            return float(steps[alike & (periods == 1.0)].mean())
-    return true_period(time) or PERIOD_S

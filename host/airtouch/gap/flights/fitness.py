@@ -38,8 +38,8 @@ def without_bad_columns(log: FlightLog) -> tuple[FlightLog, tuple[str, ...]]:
     if unfit:
         notes.append(f"left out, as most of it is missing or out of range: {', '.join(unfit)}")
     for columns, what in ((PWM, "motor commands"), (ACC, "accelerations")):
-        if not log.has(*columns):
-            raise AirTouchError(f"{name}: no {what} ({', '.join(columns)}); log them, the diagnosis "
+        if missing := [column for column in columns if not log.has(column)]:
+            raise AirTouchError(f"{name}: no {what} ({', '.join(missing)}); log them, the diagnosis "
                                 "compares the motor commands with the IMU's measurements")
     if len(log) < 2:
         raise AirTouchError(f"{name}: {len(log)} samples; at least {LEAST_AIR_S:g} s of flight are needed")
@@ -90,8 +90,9 @@ def stamped_at_arrival(log: FlightLog) -> bool:
 def cannot_tell(log: FlightLog) -> tuple[str, ...]:
     """Sentences on what no diagnosis of this log can tell, for want of a channel or of an edge."""
     cannot = []
-    if not log.has(*GYRO):
-        cannot.append("no gyro: torque only at low frequency, from the balance of the motors")
+    if missing := [column for column in GYRO if not log.has(column)]:
+        which = "gyro" if len(missing) == len(GYRO) else ", ".join(missing)
+        cannot.append(f"no {which}: torque only at low frequency, from the balance of the motors")
     if stamped_at_arrival(log):
         cannot.append("logged times are those of arrival at the host: the drone's own clock cannot be judged")
     if not log.has("zrange_m"):

@@ -11,6 +11,8 @@ WINDOW = 100  #: samples before and after a suspected loss over which the least 
 LEAST_AFTER = 20  #: samples that must follow a loss; fewer may be a burst of late packets at the end
 FASTEST_S = 1e-4  #: s, shortest sample period accepted; the fastest IMU on a Crazyflie gives 6.7 kHz
 SLOWEST_S = 5.0  #: s, longest sample period accepted; the firmware's slowest log block comes every 2.55 s
+ALIKE = 0.02  #: share of the median step by which a step may differ from one or more of it; chosen
+MOST_ALIKE = 0.7  #: share of such steps above which the longer ones are lost samples; chosen
 LATEST_S = 1e10  #: s, largest time accepted; a clock that counts from 1970 shows 1.8e9
 
 
@@ -38,18 +40,35 @@ def sample_period(log: FlightLog) -> float:
 
 
 def true_period(time_s: np.ndarray) -> float | None:
-    """Sample period in seconds: the median slope of time over index, robust to bursts and a few lost samples.
+    """Sample period in seconds: the median slope of time over the place among all samples, lost ones included.
 
+    Where most steps are one or more whole median steps, fewer than half of the samples may be lost. Elsewhere, as in a
+    clock of packets that come in bursts, the place is the index, and the slope is robust to a few lost ones.
     None for a clock that stands still or runs backwards, and for a period outside 0.0001 to 5 s.
     """
     lag = max(min(500, len(time_s) // 16), min(50, len(time_s) // 4), 1)
     if len(time_s) < 2:
         return None
-    with np.errstate(invalid="ignore", over="ignore"):
-        slopes = (time_s[lag:] - time_s[:-lag]) / lag
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        place = _places(time_s)
+        slopes = (time_s[lag:] - time_s[:-lag]) / (place[lag:] - place[:-lag])
     slopes = slopes[np.isfinite(slopes)]
     period = float(np.median(slopes)) if len(slopes) else 0.0
     return period if FASTEST_S <= period <= SLOWEST_S else None
+
+
+def _places(time_s: np.ndarray) -> np.ndarray:
+    """Place of each sample among all, (n,), lost ones included as far as whole steps of the clock tell of them."""
+    steps = np.diff(time_s)
+    known = steps[np.isfinite(steps)]
+    median = float(np.median(known)) if len(known) else 0.0
+    if not median > 0.0:
+        return np.arange(len(time_s))
+    periods = np.round(steps / median)  # negative where the clock jumps back
+    alike = (periods != 0.0) & (np.abs(steps - periods * median) < ALIKE * median)
+    if alike.mean() <= MOST_ALIKE:
+        return np.arange(len(time_s))
+    return np.r_[0.0, np.cumsum(np.where(alike, periods, 1.0))]
 
 
 def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:

@@ -1,7 +1,8 @@
 """Columns in other units, or of another sign, than their names say.
 
-Two laws of physics tell. The mean lift of a vehicle in the air is its weight, so that the accelerometer reads about one
-gravity along z. And what a gyro has turned in a short time is what the attitude has changed.
+A definition and two laws of physics tell. Roll is within +-pi, and pitch within +-pi/2. The mean lift of a vehicle in
+the air is its weight, so that the accelerometer reads about one gravity along z. And what a gyro has turned in a short
+time is what the attitude has changed.
 """
 
 import numpy as np
@@ -15,6 +16,9 @@ IN_G = (0.5, 3.1)
 #: ratio of what the gyro has turned to what the attitude has changed, above which one is in degrees: geometric mean of
 #: 1 and 57.3
 MISTAKEN_RATIO = float(np.sqrt(np.rad2deg(1.0)))
+#: rad: within these is each angle by its definition; None for yaw, which a log may count on beyond one turn
+BOUNDS = (np.pi, np.pi / 2.0, None)
+MOST_BEYOND = 0.01  #: share of the samples in the air that may be beyond, as single wrong readings; chosen
 SURE_CORRELATION = 0.8  #: of the two, least at which their ratio tells; chosen
 WINDOW_S = 0.1  #: s over which they are compared; chosen: longer than the delay of an attitude filter
 FEWEST_SAMPLES = 100  #: in the air; chosen
@@ -26,6 +30,9 @@ def wrong_units(log: FlightLog, flying: np.ndarray) -> list[str]:
     No diagnosis of such a log means anything. flying: samples in the air, (n,) bool.
     """
     faults = _acceleration_faults(log, flying)
+    if beyond := _beyond_bounds(log, flying):
+        faults += beyond  # then a gyro that turns as far as the angles is in degrees as well
+        log = log.with_columns({angle: np.deg2rad(log[angle]) for angle in ATTITUDE if log.has(angle)})
     for gyro, angle in zip(GYRO, ATTITUDE, strict=True):
         ratio = abs(turn_ratio(log, gyro, angle, flying))
         if ratio > MISTAKEN_RATIO:
@@ -56,6 +63,21 @@ def _acceleration_faults(log: FlightLog, flying: np.ndarray) -> list[str]:
         faults.append(f"{found}: it is to be in m/s^2; from g it is multiplied by {GRAVITY:g}, as acc_x and acc_y are")
     if median < -IN_G[0]:
         faults.append(f"{found}: it is to be positive where the vehicle hovers (axes: x forward, y left, z up)")
+    return faults
+
+
+def _beyond_bounds(log: FlightLog, flying: np.ndarray) -> list[str]:
+    """A sentence on each angle that is beyond the bounds of its definition in the air. flying: (n,) bool."""
+    faults = []
+    for angle, bound in zip(ATTITUDE, BOUNDS, strict=True):
+        if bound is None or not log.has(angle):
+            continue
+        size = np.abs(log[angle][flying])
+        size = size[np.isfinite(size)]
+        beyond = float((size > bound).mean()) if len(size) >= FEWEST_SAMPLES else 0.0
+        if beyond > MOST_BEYOND:
+            faults.append(f"{angle} is beyond its bound of {bound:.4g} rad in {beyond:.0%} of the samples in the air: "
+                          "it is to be in rad; from degrees it is multiplied by pi/180, as all angles are")
     return faults
 
 

@@ -10,14 +10,14 @@ from airtouch.logs.checks.channel_faults import duplicates, saturation_counts, s
 from airtouch.logs.checks.clock import LATEST_S, Gap, lost_samples, sample_period, true_period
 from airtouch.logs.checks.conventions import wrong_signs, wrong_units
 from airtouch.logs.edges import Edge, true_edges
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, RPM, VELOCITY, FlightLog
 from airtouch.logs.in_flight import airborne, flies_below_in_words
 from airtouch.logs.segments import Segment, segments
 from airtouch.parameters import DEFAULT
 
-#: group of channels -> a column of that group
-GROUPS = {"acc": "acc_x_mps2", "gyro": "gyro_x_radps", "pwm": "m1_pwm", "range": "zrange_m", "vbat": "vbat_V",
-          "position": "x_m", "velocity": "vx_mps", "attitude": "roll_rad", "rpm": "rpm_1"}
+#: group of channels -> its columns
+GROUPS = {"acc": ACC, "gyro": GYRO, "pwm": PWM, "range": ("zrange_m",), "vbat": ("vbat_V",), "position": POSITION,
+          "velocity": VELOCITY, "attitude": ATTITUDE, "rpm": RPM}
 SHORT_FLIGHT_S = 5.0  #: s in the air; a shorter flight gets a warning
 
 
@@ -61,7 +61,7 @@ def summary(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> dict[str, Any]:
     return {
         "source": log.source, "format": report.format, "samples": report.samples,
         "duration_s": report.duration_s, "rate_hz": report.rate_hz,
-        "channels": [name for name, column in GROUPS.items() if log.has(column)],
+        "channels": [name for name, columns in GROUPS.items() if any(map(log.has, columns))],
         "entries": sum(edge.kind == "entry" for edge in report.edges),
         "exits": sum(edge.kind == "exit" for edge in report.edges),
         "condition": printable(str(log.meta.get("condition", ""))), "warnings": len(report.warnings),

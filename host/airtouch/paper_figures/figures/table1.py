@@ -49,7 +49,8 @@ def measured_power(log: Path) -> Figure:
 def _same(mw: float, half_mw: float, paper_mw: float) -> bool | None:
     """Whether a measured power is the paper's; None for undecided, as with an interval that is unknown (NaN).
 
-    Yes: the 95 % interval lies within ERROR_MARGIN of the paper's. No: it leaves the paper's out.
+    Yes: the 95 % interval lies within ERROR_MARGIN of the paper's, whether it holds that or not. No: it reaches beyond
+    the margin and leaves the paper's out.
     """
     off = abs(mw - paper_mw)
     return words.decided(off + half_mw <= words.ERROR_MARGIN * paper_mw, off > half_mw)

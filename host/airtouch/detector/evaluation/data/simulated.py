@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from airtouch import logs
+from airtouch import vehicle as vehicles
 from airtouch.detector.evaluation import evaluate
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
@@ -39,10 +40,11 @@ def training_flights(
     absent = [effect for effect in without if effect not in on]
     if absent:
         raise AirTouchError(f"{absent[0]} is off in {scene.name} already; on are: {', '.join(on) or 'none'}")
+    arm_pwm = (vehicle or vehicles.load()).arm_pwm
     usable: list[FlightLog] = []
     left_out = 0
     for flight in batch.flights(scene, range(SPARE * count), vehicle=vehicle, without=without, seed=seed):
-        if isinstance(flight, FlightLog) and _usable(flight):
+        if isinstance(flight, FlightLog) and _usable(flight, arm_pwm):
             usable.append(flight)
             report("simulated flights", len(usable), count, "")
         else:
@@ -56,12 +58,12 @@ def training_flights(
                   "effects": [effect for effect in on if effect not in without], "without": list(without)}
 
 
-def _usable(flight: FlightLog | Diverged) -> bool:
-    """Whether a flight ended well, crosses an edge and can be run through a detector."""
-    if isinstance(flight, Diverged) or not logs.true_edges(flight):
+def _usable(flight: FlightLog | Diverged, arm_pwm: float) -> bool:
+    """Whether a flight ended well, crosses an edge and can be run through a detector that arms at `arm_pwm`."""
+    if isinstance(flight, Diverged) or not logs.true_edges(flight, arm_pwm=arm_pwm):
         return False
     try:
-        evaluate.check(flight)
+        evaluate.check(flight, arm_pwm=arm_pwm)
     except AirTouchError:
         return False
     return True
