@@ -14,6 +14,7 @@ from airtouch.parameters import DEFAULT
 CRUISE_MPS = 0.1  #: m/s, horizontal speed above which level flight is cruise
 LEAST_HEIGHT_M = 0.05  #: m; a drone that stays below it with its motors on has not taken off
 LEVEL_PART = 0.85  #: fraction of the median height at which take-off ends and landing starts
+HIGH_PART = 0.5  #: fraction of the median height from which on a log that begins or ends in the air was cut; chosen
 PLATFORM_STEP_M = 0.12  #: m, least step of the down range at a platform's edge; low platforms included
 KINDS = ("ground", "take-off", "hover", "cruise", "over platform", "landing")
 
@@ -31,7 +32,8 @@ def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
     """The phases of a flight in order; every sample is in one of them.
 
     Ground: motors below the airborne level, or never higher than 5 cm where a height was measured. Take-off: until
-    85 % of the median height in the air; landing: from the last time at that height.
+    85 % of the median height in the air; landing: from the last time at that height. A log that begins or ends in the
+    air, half of the median height up or more, has no take-off or no landing there.
     Over platform: from an entry to its exit by the down range, or to the landing where none follows. The rest is cruise
     where the speed is above 0.1 m/s, else hover; without velocity it is all cruise if
     the flight crosses an edge, else all hover. arm_pwm: the airborne level, of a vehicle's
@@ -56,7 +58,7 @@ def segments(log: FlightLog, arm_pwm: float = DEFAULT.arm_pwm) -> list[Segment]:
         if measured and not np.any(ground_height[here] > LEAST_HEIGHT_M):
             kinds[here] = KINDS.index("ground")
         elif measured:
-            _ends(kinds[here], ground_height[here])
+            _ends(kinds[here], ground_height[here], start == 0, stop == len(log))
         descent = int(np.argmax(np.r_[kinds[here] == KINDS.index("landing"), True])) + start
         for edge, end in zip(crossing, [*(e.sample for e in crossing[1:]), descent], strict=False):
             if edge.kind == "entry":
@@ -78,11 +80,15 @@ def _height(log: FlightLog, edges: list[Edge]) -> np.ndarray:
     return height
 
 
-def _ends(kinds: np.ndarray, height: np.ndarray) -> None:
-    """Mark take-off and landing in `kinds`, (n,), in place."""
-    level = np.flatnonzero(height >= LEVEL_PART * np.nanmedian(height)) if np.isfinite(height).any() else []
-    if len(level):
+def _ends(kinds: np.ndarray, height: np.ndarray, begins_log: bool, ends_log: bool) -> None:
+    """Mark take-off and landing in `kinds`, (n,), in place; none where the log begins or ends high in the air."""
+    if not np.isfinite(height).any():
+        return
+    known, median = height[np.isfinite(height)], np.nanmedian(height)
+    level = np.flatnonzero(height >= LEVEL_PART * median)
+    if not begins_log or known[0] < HIGH_PART * median:
         kinds[:level[0]] = KINDS.index("take-off")
+    if not ends_log or known[-1] < HIGH_PART * median:
         kinds[level[-1] + 1:] = KINDS.index("landing")
 
 

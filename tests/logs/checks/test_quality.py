@@ -114,6 +114,20 @@ def test_a_flight_that_lands_on_the_platform_has_a_landing():
     assert platform.start == 800 and 1500 < landing.start < 1600 and landing.stop == 1800
 
 
+@pytest.mark.parametrize(("begins_m", "ends_m", "kinds"), [
+    (0.56, 0.6, ["hover"]), (0.1, 0.6, ["take-off", "hover"]), (0.56, 0.1, ["hover", "landing"])])
+def test_a_flight_cut_high_in_the_air_has_no_take_off_and_no_landing(begins_m, ends_m, kinds):
+    """Of a climb and a descent around 0.9 m, the motors on throughout."""
+    height = np.r_[np.linspace(begins_m, 0.9, 200), np.full(600, 0.9), np.linspace(0.9, ends_m, 200)]
+    log = FlightLog({"t_s": np.arange(1000) * 0.01, "z_m": height} | dict.fromkeys(PWM, np.full(1000, 40000.0)),
+                    {"source": "cut", "warnings": []})
+    assert [s.kind for s in logs.segments(log)] == kinds
+    standing = {"z_m": np.r_[np.zeros(100), height[100:-100], np.zeros(100)]} | dict.fromkeys(
+        PWM, np.r_[np.zeros(100), np.full(800, 40000.0), np.zeros(100)])
+    whole = logs.segments(log.with_columns(standing))
+    assert [s.kind for s in whole] == ["ground", "take-off", "hover", "landing", "ground"]
+
+
 def test_a_platform_crossed_on_a_lower_leg_is_no_landing():
     """Most of the flight is at 1.0 m; the platform of 0.5 m is crossed at 0.6 m, from 21 to 24 s."""
     time = 0.01 * np.arange(3000)
