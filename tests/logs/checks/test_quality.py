@@ -79,6 +79,42 @@ def test_every_lost_sample_of_an_even_clock_is_counted(share):
     assert not remarks(whole)
 
 
+def held_back(rng, time_s):
+    """A packet in 20 waits for the next one."""
+    late = rng.choice(len(time_s) - 2, len(time_s) // 20, replace=False)
+    time_s[late] = time_s[late + 1] - 1e-4
+    return np.maximum.accumulate(time_s)
+
+
+def stamped_twice(rng, time_s):
+    """A row in ten bears the time of the row before it."""
+    late = 1 + rng.choice(len(time_s) - 2, len(time_s) // 10, replace=False)
+    time_s[late] = time_s[late - 1]
+    return time_s
+
+
+def ticks(rng, time_s):
+    """A clock of 10 ms whose reading jitters by 4 ms."""
+    return np.maximum.accumulate(np.floor((time_s + 0.005 + rng.normal(0.0, 0.004, len(time_s))) / 0.01) * 0.01)
+
+
+@pytest.mark.parametrize("late", [held_back, stamped_twice, ticks])
+def test_a_late_sample_that_catches_up_is_no_lost_one(late):
+    time_s = late(np.random.default_rng(0), np.arange(3000) * 0.01)
+    assert true_period(time_s) == pytest.approx(0.01, rel=1e-3)
+    assert not lost_samples(time_s, true_period(time_s))
+
+
+def test_lost_samples_are_counted_among_late_ones():
+    rng = np.random.default_rng(1)
+    there = rng.random(3000) >= 0.3
+    there[-40:] = True
+    time_s = held_back(rng, np.arange(3000) * 0.01)[there]
+    assert true_period(time_s) == pytest.approx(0.01, rel=1e-3)
+    lost = sum(g.lost for g in lost_samples(time_s, true_period(time_s)))
+    assert lost == pytest.approx(np.count_nonzero(~there), rel=0.03)
+
+
 def test_rows_lost_in_the_air_are_no_ground():
     log = sound_flight()
     segments = logs.segments(log)

@@ -12,7 +12,7 @@ LEAST_AFTER = 20  #: samples that must follow a loss; fewer may be a burst of la
 FASTEST_S = 1e-4  #: s, shortest sample period accepted; the fastest IMU on a Crazyflie gives 6.7 kHz
 SLOWEST_S = 5.0  #: s, longest sample period accepted; the firmware's slowest log block comes every 2.55 s
 ALIKE = 0.02  #: share of the median step by which a step may differ from one or more of it; chosen
-MOST_ALIKE = 0.7  #: share of such steps above which the longer ones are lost samples; chosen
+MOST_ALIKE = 0.7  #: share of such steps above which the longer ones may be lost samples; chosen
 LATEST_S = 1e10  #: s, largest time accepted; a clock that counts from 1970 shows 1.8e9
 
 
@@ -58,17 +58,19 @@ def true_period(time_s: np.ndarray) -> float | None:
 
 
 def _places(time_s: np.ndarray) -> np.ndarray:
-    """Place of each sample among all, (n,), lost ones included as far as whole steps of the clock tell of them."""
+    """Place of each sample among all, (n,): its index, plus the samples lost before it where the clock is even."""
     steps = np.diff(time_s)
     known = steps[np.isfinite(steps)]
     median = float(np.median(known)) if len(known) else 0.0
+    place = np.arange(len(time_s), dtype=np.float64)
     if not median > 0.0:
-        return np.arange(len(time_s))
-    periods = np.round(steps / median)  # negative where the clock jumps back
-    alike = (periods != 0.0) & (np.abs(steps - periods * median) < ALIKE * median)
-    if alike.mean() <= MOST_ALIKE:
-        return np.arange(len(time_s))
-    return np.r_[0.0, np.cumsum(np.where(alike, periods, 1.0))]
+        return place
+    periods = np.round(steps / median)
+    if np.mean((periods != 0.0) & (np.abs(steps - periods * median) < ALIKE * median)) <= MOST_ALIKE:
+        return place
+    for gap in lost_samples(time_s, median):
+        place[gap.sample:] += gap.lost
+    return place
 
 
 def lost_samples(time_s: np.ndarray, period: float) -> list[Gap]:
