@@ -130,9 +130,13 @@ def test_an_edge_after_a_restart_is_on_the_new_track():
     fly(1000, 31000, 0.0, -5000)
     with pytest.raises(Restarted):
         fly(1000, 3000, 30.0, 2000)
+    assert monitor.board.closing_line().startswith("30.0 s watched: ")
     monitor.restart()
+    assert monitor.board.closing_line().startswith("0.0 s watched since the drone's last restart: ")
     fly(1500, 11500, 30.0, 2000)
     for edges in (0, 1):
         monitor.take([Sample(app_log.WANTED.name, 11500, 41.5, app | {"airtouch.edges": edges, "airtouch.edge": 1})])
     assert [edge.x_m for edge in monitor.board.edges] == [2.0]
     assert monitor.board.now_s < 11.0
+    told = "10.0 s watched since the drone's last restart: no data; 1 edges ("
+    assert monitor.board.closing_line().startswith(told)

@@ -141,7 +141,7 @@ def convert(files: tuple[str, ...], out: str, ending: str, mapping: str | None, 
         if plain:
             write_bytes(canonical.plain_csv(log), target, force)
         elif ending == RERUN:
-            write_bytes(rerun_file.recording(log), target, force)
+            write_bytes(rerun_file.recording(log, arm_pwm_of(log.meta)), target, force)
         else:
             write(log, target, force)
         written.add(target)

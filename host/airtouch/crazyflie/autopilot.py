@@ -3,6 +3,7 @@
 The firmware answers every command of the high-level commander; a command without an answer is sent again.
 While the link is silent the firmware finishes its leg and hovers. Nothing is sent to a drone that was not heard for
 SILENT_S: it may have restarted, and a landing would spin its motors. A stop lands it as soon as it is heard again.
+A landing that was not accepted is over when the drone no longer says that it flies, where it says so.
 """
 
 import math
@@ -17,6 +18,7 @@ SILENT_S = 1.0  #: s without a packet, after which nothing is sent until one com
 TRIES = 8  #: times that a command is sent; after that it counts as accepted if log packets still arrive
 LATE_S = 1.0  #: s after which an answer that has not come counts as lost; assumed
 SETTLE_S = 1.0  #: s from the end of a landing to the stop of the motors
+FLYING_S = 3.0  #: s from the end of a landing to the next; for 2 s after its motors stop the firmware says "flying"
 BUSY = 16  #: the firmware's EBUSY: the supervisor does not let it fly
 
 
@@ -35,7 +37,7 @@ class Autopilot:
     """Flies the legs of a mission. Call `step` often; it returns the commands to send.
 
     phase: mission, landing or done. refused: why the drone refused a command, else None.
-    reason: why it landed early, else None.
+    reason: why it landed early, else None. flying: whether the drone says that it flies; None if it does not say.
     """
 
     legs: Sequence[Leg]
@@ -45,8 +47,10 @@ class Autopilot:
     refused: str | None = None
     index: int = -1
     in_air: bool = False
+    flying: bool | None = None
     _command: Command | None = None
     _answered: bool = True
+    _accepted: bool = False  #: answered with code 0
     _tries: int = 0
     _sent_s: float = -math.inf
     _until_s: float = -math.inf
@@ -63,6 +67,12 @@ class Autopilot:
         """True if the last command has not been answered yet."""
         return not self._answered
 
+    @property
+    def flies_on(self) -> bool:
+        """True if the drone says that it flies, and the last command was a landing that it has not accepted."""
+        lands = self._command is not None and self._command.kind == "land"
+        return lands and self.in_air and not self._accepted and bool(self.flying)
+
     def answer(self, kind: str, code: int) -> None:
         """Handle the drone's answer to a command: its kind and an error code, 0 for accepted.
 
@@ -77,8 +87,10 @@ class Autopilot:
         if self._answered or len(self._unanswered_s) >= self._tries:
             return
         repeated = self._tries > 1  # the first may have been accepted and its answer lost
-        if code == 0 or self.phase == "landing" or (repeated and code != BUSY):
-            self._answered = True
+        if code == 0 or (repeated and code != BUSY) or (self.phase == "landing" and not self.flying):
+            self._answered, self._accepted = True, code == 0
+            return
+        if self.phase == "landing":
             return
         self.refused = f"the drone refused {kind} (code {code}); restart it"
         if code == BUSY:
@@ -102,13 +114,18 @@ class Autopilot:
         """The commands to send now. now_s: drone's clock; wall_s: host's; silence_s: since the last packet."""
         if self.phase == "done":
             return []
-        lands = self.phase == "landing" and self._command is not None and self._answered  # by itself, to the end
+        lands = self.phase == "landing" and self._command is not None and self._answered and not self.flies_on
         if silence_s > SILENT_S and not lands:
             return []
         if self._command is not None and not self._answered:
             return self._again(now_s, wall_s, silence_s)
         if now_s < self._until_s:
             return []
+        if self.flies_on and now_s < self._until_s + FLYING_S:
+            return []
+        if self.flies_on:
+            self.land("the drone flies on after its landing")
+            return self._send(self.landing_command(), now_s, wall_s)
         if self.phase == "landing":
             return self._come_down(now_s, wall_s)
         self.index += 1
@@ -139,7 +156,7 @@ class Autopilot:
         same = self._command is not None and self._command.kind == command.kind
         owed = [sent_s for sent_s in self._unanswered_s if same and wall_s - sent_s < LATE_S]
         self._unanswered_s = [*owed, wall_s]
-        self._command, self._answered, self._tries = command, False, 1
+        self._command, self._answered, self._accepted, self._tries = command, False, False, 1
         self._sent_s, self._wall_sent_s = now_s, wall_s
         rest = SETTLE_S if command.kind == "land" else 0.0
         self._until_s = now_s + command.seconds + rest

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from threading import Event
 from typing import Protocol
 
-from airtouch.crazyflie.autopilot import Autopilot
+from airtouch.crazyflie.autopilot import BUSY, FLYING_S, Autopilot
 from airtouch.crazyflie.checks import CONFLICTS, LOWEST_V
 from airtouch.crazyflie.connection.commands import Command
 from airtouch.crazyflie.connection.drone import drain
@@ -119,6 +119,7 @@ class Flight:
             self._repair_link(silence)
             self._ping(wall)
             return self._after_restart(wall)
+        self.pilot.flying = self._flying()
         for kind, code in drain(self.craft.answers):
             self.pilot.answer(kind, code)
         self._land_early(silence)
@@ -127,16 +128,23 @@ class Flight:
         self._repair_link(silence)
         self._send(self.pilot.step(self._now(silence), wall, silence))
         self._ping(wall)
-        if self._landing_since is not None and self.pilot.waiting and wall - self._landing_since > GIVE_UP_S:
-            return f"{self.pilot.reason}; NO CONTACT for {GIVE_UP_S:.0f} s, land by hand"
+        lands = not self.pilot.waiting and not self.pilot.flies_on
+        if self._landing_since is not None and not lands and wall - self._landing_since > GIVE_UP_S:
+            hears = self.pilot.flies_on and silence < SILENCE_S
+            what = "IT FLIES ON after land commands" if hears else "NO CONTACT"
+            return f"{self.pilot.reason}; {what} for {GIVE_UP_S:.0f} s, land by hand"
         return None
+
+    def _flying(self) -> bool | None:
+        """Whether the drone says that it flies; None if it does not say."""
+        return None if self.intake.supervisor is None else bool(self.intake.supervisor & FLYING)
 
     def _flies_on(self) -> bool:
         """True if a drone whose clock started again says that it flies; it then lands.
 
         Only its own word counts: a landing that is sent to a drone that fell would spin its motors.
         """
-        if not self.pilot.in_air or self.intake.supervisor is None or not self.intake.supervisor & FLYING:
+        if not self.pilot.in_air or not self._flying():
             return False
         self._restarted_s = None
         self._land_for("the drone's clock jumped")
@@ -270,14 +278,22 @@ class Flight:
             return
         self._tell("an error in flight: landing")
         command = self.pilot.landing_command()
-        for _ in range(LAND_TRIES):
+        for tried in range(LAND_TRIES):
             try:
                 self.craft.send([command])
                 self.sleep(LAND_WAIT_S)
-                if any(kind == "land" for kind, _ in drain(self.craft.answers)):
-                    self._on_the_ground()
-                    self.sleep(command.seconds + 1.0)
-                    self.craft.send([Command("stop")])
-                    return
+                codes = [code for kind, code in drain(self.craft.answers) if kind == "land"]
+                accepted = 0 in codes or not self._flying()
+                if not codes or not (accepted or (tried and BUSY not in codes)):
+                    continue
+                if not accepted:  # it may be landing since an earlier command, whose answer was lost
+                    self.sleep(command.seconds + FLYING_S)
+                    self.intake.take(drain(self.craft.samples))
+                    if self._flying():
+                        return
+                self._on_the_ground()
+                self.sleep(command.seconds + 1.0 if accepted else 0.0)
+                self.craft.send([Command("stop")])
+                return
             except Exception:  # the guard process lands the drone when this one ends
                 return

@@ -49,3 +49,19 @@ def test_rows_with_other_numbers_of_cells_are_counted(tmp_path):
 def test_without_a_complete_row_there_is_no_log(tmp_path, text):
     with pytest.raises(AirTouchError, match="no header and complete rows"):
         read(tmp_path, text.encode())
+
+
+def test_a_mapped_name_that_occurs_twice_is_refused(tmp_path):
+    with pytest.raises(AirTouchError, match="2 columns are called 'a'"):
+        read(tmp_path, TEXT.replace("t,a,z", "t,a,z,a", 1).encode())
+    assert len(read(tmp_path, TEXT.replace("t,a,z", "t,a,z,x,x", 1).encode())) == 300  # no business of the map
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_rows_that_an_unclosed_quotation_mark_takes_are_told_of(tmp_path, end):
+    lines = TEXT.splitlines()
+    lines[200] = lines[200].replace("9.81", '"9.81')
+    log = read(tmp_path, (end.join(lines) + end).encode())
+    assert len(log) == 200  # of 300
+    told = [w for w in log.meta["warnings"] if "line end" in w]
+    assert len(told) == 1 and told[0].startswith("cells with a line end in them: 1, the first '9.81,")

@@ -1,5 +1,8 @@
 """A flight as a Rerun recording, read back by Rerun itself; and the plain CSV, read back by pandas."""
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -7,6 +10,9 @@ from click.testing import CliRunner
 import short_flights
 from airtouch import logs
 from airtouch.cli.logs import command
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import PWM
+from airtouch.logs.formats import rerun_file
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +50,59 @@ def test_rerun_reads_every_sample_back(flight, tmp_path):
         np.testing.assert_allclose(np.array(samples[name][0])[order], (log["t_s"] - log["t_s"][0])[there], atol=1e-6)
     assert len(samples["vx_mps"][0]) == len(log) - 10
     assert samples["edges"][1] == [edge.kind for edge in logs.true_edges(log)]
+
+
+@pytest.fixture
+def sent(monkeypatch):
+    """What Rerun is given, by entity: seconds and values of each channel, and the edges; Rerun itself is not needed."""
+    sent, now = {}, [0.0]
+
+    def send_columns(name, indexes, columns):
+        sent[name] = (indexes[0], columns)
+
+    stream = SimpleNamespace(binary_stream=lambda: SimpleNamespace(read=lambda: b"rrd"), send_columns=send_columns,
+                             set_time=lambda _, duration: now.__setitem__(0, duration), flush=lambda: None,
+                             log=lambda name, text: sent.setdefault(name, []).append((now[0], text)))
+    fake = SimpleNamespace(RecordingStream=lambda *_, **__: stream, TimeColumn=lambda _, duration: duration,
+                           Scalars=SimpleNamespace(columns=lambda scalars: scalars), TextLog=lambda text: text)
+    monkeypatch.setitem(sys.modules, "rerun", fake)
+    monkeypatch.setattr(rerun_file, "need", lambda *_: None)
+    return sent
+
+
+def test_a_first_sample_without_a_time_costs_no_other(flight, sent):
+    log = logs.read(flight)
+    log.columns["t_s"] = log["t_s"] + 7.0
+    log.columns["t_s"][:3] = np.nan
+    rerun_file.recording(log)
+    times, values = sent["zrange_m"]
+    there = np.isfinite(log["zrange_m"]) & np.isfinite(log["t_s"])
+    np.testing.assert_allclose(values, log["zrange_m"][there])
+    assert times[0] == 0.0 and times[-1] == pytest.approx(0.01 * (len(log) - 4), abs=0.02)
+    log.columns["t_s"][:] = np.nan
+    with pytest.raises(AirTouchError, match="no sample has a time"):
+        rerun_file.recording(log)
+
+
+def test_the_edges_of_a_recording_go_by_the_arm_pwm(flight, sent):
+    """A light vehicle hovers at 9,000; only a spin-up passes the default."""
+    log = logs.read(flight)
+    for motor in PWM:
+        log.columns[motor] = np.full(len(log), 9000.0)
+        log.columns[motor][100:110] = 20000.0
+    rerun_file.recording(log)
+    assert "edges" not in sent
+    rerun_file.recording(log, arm_pwm=8000.0)
+    assert [kind for _, kind in sent["edges"]] == ["entry", "exit"]
+
+
+def test_convert_hands_over_the_arm_pwm_of_the_vehicle(flight, tmp_path, monkeypatch):
+    handed = []
+    monkeypatch.setattr(rerun_file, "recording", lambda log, arm_pwm: handed.append(arm_pwm) or b"rrd")
+    monkeypatch.setattr("airtouch.extras.need", lambda *_: None)
+    monkeypatch.setattr("airtouch.cli.logs.arm_pwm_of", lambda meta: 12345.0)
+    convert(flight, "--format", "rrd", "--out", tmp_path)
+    assert handed == [12345.0]
 
 
 def test_pandas_reads_the_plain_table_back(flight, tmp_path):

@@ -53,4 +53,4 @@ def command(uri: str, duration: float | None, host_detector: bool, settings: tup
                 monitor.watch(drone, watcher, duration, stop, show, say)
         finally:
             drone.close()
-    click.echo(f"{board.now_s:.1f} s watched: {board.link or 'no data'}; {len(board.edges)} edges ({board.detector})")
+    click.echo(board.closing_line())

@@ -62,6 +62,7 @@ class Board:
     """Data of the live view: signals of the last SECONDS, track, edges, link.
 
     lag_s: delay from a crossing to its report; an edge is placed on the track that much earlier.
+    restarts: how often the drone's clock began again; now_s and edges are since the last time.
     """
 
     title: str
@@ -70,6 +71,7 @@ class Board:
     link: Link | None = None
     status: str = ""
     now_s: float = 0.0
+    restarts: int = 0
     edges: list[ReportedEdge] = field(default_factory=list)
     latest: dict[str, float] = field(default_factory=dict)
     _signals: dict[str, deque] = field(
@@ -97,6 +99,13 @@ class Board:
         """Forget signals, track and edges: their times are of a clock that begins again."""
         for values in (*self._signals.values(), self._track, self.edges):
             values.clear()
+        self.now_s, self.restarts = 0.0, self.restarts + 1
+
+    def closing_line(self) -> str:
+        """What was watched, as one line: seconds, link and edges, all since the last restart of the drone."""
+        since = " since the drone's last restart" if self.restarts else ""
+        return (f"{self.now_s:.1f} s watched{since}: {self.link or 'no data'}; {len(self.edges)} edges "
+                f"({self.detector})")
 
     def add_edge(self, kind: str, at_s: float, probability: float) -> ReportedEdge:
         """Add an edge reported at `at_s`. Its position is that of the drone one lag earlier."""

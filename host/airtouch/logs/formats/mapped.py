@@ -75,9 +75,9 @@ def _check_column(how: Any, place: str) -> None:
 def read(path: str | Path, mapping: str | Path) -> FlightLog:
     """The flight log of a CSV with a header line, by a column map (a TOML file).
 
-    Cells that are no numbers become NaN; a warning counts them, and another the rows that have not as many cells as
-    the header. A last line without a line end is dropped with a warning: its last number may lack digits. Raises
-    AirTouchError for columns that the CSV lacks.
+    Cells that are no numbers become NaN; a warning counts them, others the rows that have not as many cells as the
+    header and the cells with a line end in them. A last line without a line end is dropped with a warning: its last
+    number may lack digits. Raises AirTouchError for columns that the CSV lacks or has twice.
     """
     table = load(mapping)
     warnings: list[str] = []
@@ -88,11 +88,18 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
     ragged = sum(len(row) != len(header) for row in rows[1:])
     if ragged:
         warnings.append(f"{ragged} of {len(rows) - 1} rows have not the header's number of cells, {len(header)}")
+    swallowed = [cell for row in rows for cell in row if "\n" in cell]
+    if swallowed:
+        warnings.append(f"cells with a line end in them: {len(swallowed)}, the first '{printable(swallowed[0], 20)}': "
+                        "a quotation mark that is not closed takes the rows after it into one cell")
     columns = {}
     for name, how in table["columns"].items():
         if how["from"] not in header:
             raise AirTouchError(f"{path}: no column {how['from']!r}{nearest(how['from'], header)} ({mapping}: "
                                 f"[columns.{name}])")
+        if header.count(how["from"]) > 1:
+            raise AirTouchError(f"{path}: {header.count(how['from'])} columns are called {how['from']!r} ({mapping}: "
+                                f"[columns.{name}]); rename the others")
         place = header.index(how["from"])
         cells = [r[place].strip() if place < len(r) else "" for r in rows[1:]]
         theirs, texts = np.array([_number(cell) for cell in cells]), [cell for cell in cells if _is_text(cell)]
