@@ -30,7 +30,7 @@ static float bandLow(const appParams_t *params) { return params->bandMid - 0.5f 
 
 static float bandHigh(const appParams_t *params) { return params->bandMid + 0.5f * params->bandWidth; }
 
-/** The pipeline's settings cannot fail: appParamsClamp keeps each within what the pipeline takes. A test tries them all. */
+/** The pipeline cannot refuse its settings: appParamsClamp keeps each within what it takes. A test tries them. */
 static void beginPipeline(appCore_t *core) {
   edgePipelineConfig_t config;
   edgePipelineDefaults(&config, &core->vehicle);
