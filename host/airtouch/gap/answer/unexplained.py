@@ -18,9 +18,9 @@ from airtouch.gap.signals.spectra import AIR, LENGTH, frequencies, short_time_sp
 from airtouch.gap.signatures.candidates import mean_of
 from airtouch.gap.study import Study
 from airtouch.gap.where import summary
-from airtouch.gap.where.band_sums import runs_of_phases, stretches
+from airtouch.gap.where.band_sums import block_bounds, block_sums
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, filtered, gains
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 from airtouch.logs.segments import KINDS
 
 MOST_CELLS = 5  #: cells that are reported at most; chosen, as many as a reader can take in
@@ -30,11 +30,10 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
                 ) -> list[OpenCell]:
     """What stays open: cells of the map, each with the flight and the seconds of its phase in which most is left.
 
-    A phase too short for a block of spectra has one of its own runs instead (`_runs_in_phase`), and no signals.
-
-    Where the flights are less steady than nominal ones, what shakes most comes before them (`_unsteady_cell`). cells:
-    the headline, then the others, those with the largest gap before any effect first. Of these the first
-    MOST_CELLS are reported, without those on the ground and those of one regime alone.
+    A phase too short for a block of spectra has a block of the map instead (`_blocks_in_phase`), and no signals. Where
+    the flights are less steady than nominal ones, what shakes most comes before them (`_unsteady_cell`). cells: the
+    headline, then the others, those with the largest gap before any effect first. Of these the first MOST_CELLS are
+    reported, without those on the ground and those of one regime alone.
 
     What is left is the residual with the effects of the last step in the model, deviations included, at the values
     fitted to the first half of the data (`Hypothesis.terms`), not at those of the answer, which are fitted to all of it
@@ -50,14 +49,15 @@ def unexplained(study: Study, flights: Sequence[Flight], selection: Selection, c
         out.append(_unsteady_cell(study, flights, COLUMNS[selection.unsteadiness_rarity.rarest], near))
     for cell in chosen:
         ratios = _in_phase([(f, ratios_of_blocks(f, residual, cell)) for f, residual in residuals], cell.phase)
-        runs = [] if ratios else [(f, *run) for f, residual in residuals for run in _runs_in_phase(f, residual, cell)]
+        blocks = [] if ratios else [(f, *b) for f, residual in residuals
+                                    for b in _blocks_in_phase(study, f, residual, cell)]
         if ratios:
             flight, ratio = max(ratios, key=lambda pair: float(np.nanmax(pair[1])))
             begin = starts(flight, AIR)
             first, last = worst_interval(ratio, begin)
             start, stop, over_floor = begin[first], begin[last] + LENGTH[AIR], ratio[first:last + 1].max()
-        elif runs:
-            flight, start, stop, over_floor = max(runs, key=lambda run: run[3])
+        elif blocks:
+            flight, start, stop, over_floor = max(blocks, key=lambda block: block[3])
         else:
             continue
         out.append(OpenCell(
@@ -106,22 +106,17 @@ def _in_phase(ratios: Sequence[tuple[Flight, np.ndarray]], phase: str) -> list[t
     return [(f, ratio) for f, ratio in within if np.isfinite(ratio).any()]
 
 
-def _runs_in_phase(flight: Flight, residual: np.ndarray, cell: Cell) -> list[tuple[int, int, float]]:
-    """First sample, the one after the last, and rms over the floor of each run of a cell's phase, cut as in the map.
+def _blocks_in_phase(study: Study, flight: Flight, residual: np.ndarray, cell: Cell) -> list[tuple[int, int, float]]:
+    """First sample, the one after the last, and rms over the floor of each block of the map in a cell's phase.
 
-    residual (n, COUNT): of the flight. No run where the log lacks the channel, or where no row is judged.
+    residual (n, COUNT): of the flight. No block where the log lacks the channel, or where no row is judged.
     """
-    c, place, out = COLUMN[cell.channel], KINDS.index(cell.phase), []
-    for start, stop in stretches(flight):
-        valid = ~flight.bridged[start:stop]
-        values = interpolate_over(residual[start:stop, c:c + 1], valid)
-        band = filtered(values)[MAP_BANDS_HZ.index(cell.band_hz), :, 0]
-        for first, last in runs_of_phases(flight.phase[start:stop]):
-            judged = band[first:last][valid[first:last]]
-            if flight.phase[start + first] == place and len(judged) and np.isfinite(judged).all():
-                rms = float(np.sqrt(np.mean(judged ** 2)))
-                out.append((start + first, start + last, rms / max(cell.floor, summary.SMALLEST_FLOOR)))
-    return out
+    sums = block_sums(flight, residual, study.vehicle)
+    power, weight = sums.power[:, 0, MAP_BANDS_HZ.index(cell.band_hz), COLUMN[cell.channel]], sums.weight[:, 0]
+    over_floor = np.sqrt(power / weight) / max(cell.floor, summary.SMALLEST_FLOOR)
+    return [(start, stop, float(ratio)) for (start, stop), phase, ratio
+            in zip(block_bounds(flight), sums.phase, over_floor, strict=True)
+            if phase == KINDS.index(cell.phase) and np.isfinite(ratio)]
 
 
 def _commonest_phase(flight: Flight) -> np.ndarray:

@@ -108,6 +108,13 @@ def block_sums(flight: Flight, residual: np.ndarray, vehicle: Vehicle) -> Sums:
     return Sums(phase.astype(int), np.zeros(len(phase), int), weight, power, mean)
 
 
+def block_bounds(flight: Flight) -> list[tuple[int, int]]:
+    """First sample, and the one after the last, of the blocks of `block_sums`."""
+    everywhere = np.ones((len(flight), 1), bool)
+    return [(start + here.start, start + here.stop) for start, stop in stretches(flight)
+            for here, _ in _blocks_with_samples(flight, everywhere, start, stop)]
+
+
 def samples_within(flight: Flight, acts: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     """Samples (b, r) of the blocks of `block_sums`, in each of REGIMES, at which acts (n,) is true."""
     member = regimes(flight, vehicle)
@@ -123,7 +130,7 @@ def _blocks_with_samples(flight: Flight, member: np.ndarray, start: int, stop: i
     member (n, r): which samples of the flight are in which of REGIMES.
     """
     valid = ~flight.bridged[start:stop]
-    for first, last in runs_of_phases(flight.phase[start:stop]):
+    for first, last in _phase_blocks(flight.phase[start:stop]):
         here = slice(first, last)
         mask = (member[start:stop][here] & valid[here, None]).T.astype(np.float64)
         if mask[0].any():
@@ -137,7 +144,7 @@ def stretches(flight: Flight) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True) if kind[a] and b - a > 1]
 
 
-def runs_of_phases(phase: np.ndarray) -> list[tuple[int, int]]:
+def _phase_blocks(phase: np.ndarray) -> list[tuple[int, int]]:
     """Runs of one phase cut into equal blocks of about BLOCK samples; short phases are one block."""
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
     blocks = []
