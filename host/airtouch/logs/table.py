@@ -85,9 +85,8 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
     warning: one without a line end, as its last number may lack digits, or else a bad one. Raises
     AirTouchError with file and line for any other bad cell or row.
     """
-    cut = bool(body.rpartition(b"\n")[2].strip())
-    if cut:
-        body = _without_last_line(body, first_line, warnings)
+    complete = without_cut_line(body, first_line, warnings)
+    cut, body = complete != body, complete
     if not body or body.isspace():
         raise AirTouchError(f"{source}: no complete row of data; log the flight again or leave the file out")
     if b",," in body or b",\n" in body or b"\n," in body or body.startswith(b","):
@@ -105,6 +104,14 @@ def parse_table(body: bytes, source: str, columns: int, first_line: int,
         if table is not None:
             return table
     raise AirTouchError(f"{source}:{first_line + bad_line}: {problem}; correct or delete that line")
+
+
+def without_cut_line(body: bytes, first_line: int, warnings: list[str]) -> bytes:
+    """The text without a last line that has no line end, as its last number may lack digits; a warning names it.
+
+    first_line: the number of its first line in the file.
+    """
+    return _without_last_line(body, first_line, warnings) if body.rpartition(b"\n")[2].strip() else body
 
 
 def _bulk(body: bytes, columns: int) -> np.ndarray | None:

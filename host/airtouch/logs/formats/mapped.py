@@ -25,6 +25,7 @@ from airtouch.errors import AirTouchError, nearest, printable
 from airtouch.logs.checks.readings import LARGEST, without_impossible_values
 from airtouch.logs.files import load_text
 from airtouch.logs.flight_log import COLUMNS, FlightLog
+from airtouch.logs.table import without_cut_line
 
 KEYS = ("from", "scale", "offset")
 OURS = ("source", "format", "warnings")  #: metadata that the reader sets
@@ -116,12 +117,9 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
 
 def _rows(path: str | Path, warnings: list[str]) -> list[list[str]]:
     """The cells of each complete line of a CSV, without comments and blank lines."""
-    text = load_text(path, warnings).decode("utf-8", "replace")
-    complete, newline, cut = text.rpartition("\n")
-    if cut.strip():
-        warnings.append(f"line {complete.count(chr(10)) + 1 + len(newline)} is cut off and was dropped")
+    text = without_cut_line(load_text(path, warnings), 1, warnings).decode("utf-8", "replace")
     try:
-        rows = list(csv.reader(io.StringIO(complete)))
+        rows = list(csv.reader(io.StringIO(text)))
     except csv.Error as error:
         raise AirTouchError(f"{path}: cannot be read as CSV: {error}") from None
     return [row for row in rows if row and not row[0].startswith("#")]
