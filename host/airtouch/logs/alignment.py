@@ -13,7 +13,7 @@ HOLD_S = 0.25  #: s for which the last value of a signal is repeated; after that
 #: s, the longest gap between readings of the down range that is bridged; a step over a longer one is no true edge.
 #: Chosen: 3 readings at 24 Hz
 OLDEST_RANGE_S = 0.15
-GAP_PERIODS = 1.5  #: sample periods that are no gap: one of a slow log exceeds OLDEST_RANGE_S
+GAP_PERIODS = 1.5  #: sample periods that are always bridged: one of a slow log exceeds the limits in seconds
 ROUNDING_S = 1e-6  #: s, added to the longest gap, so that one of exactly 0.15 s is bridged in floating point
 HOLD_BATTERY_S = 5.0  #: s, the same of the battery, which is often logged at 1 Hz or less and changes slowly; chosen
 Signal = tuple[np.ndarray, np.ndarray]  #: times (n,) in s and values (n,)

@@ -3,12 +3,11 @@
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.logs.alignment import hold, hold_of, hold_range, oldest_range_s
+from airtouch.logs.alignment import GAP_PERIODS, hold, hold_of, hold_range, oldest_range_s
 from airtouch.logs.checks.clock import FASTEST_S, SLOWEST_S, regular_time, rising_subsequence, true_period
 from airtouch.logs.flight_log import LARGEST_BYTES, PWM, RANGES, FlightLog
 
-LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN, unless they are within LONGEST_BRIDGE_PERIODS; not of HELD
-LONGEST_BRIDGE_PERIODS = 1.5  #: sample periods that are always bridged: one of a slow log exceeds 0.1 s
+LONGEST_BRIDGE_S = 0.1  #: s; longer gaps become NaN, unless they are within GAP_PERIODS; not of HELD
 CUTOFF = 0.4  #: corner of the anti-aliasing low-pass as a fraction of the new rate
 HELD = ("zrange_m", *RANGES, "vbat_V")  #: slow or stepping channels, resampled by holding the last value, unfiltered
 ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
@@ -80,7 +79,7 @@ def _columns(columns: dict[str, np.ndarray], time_s: np.ndarray, new_time: np.nd
         if name == "zrange_m" and valid.any():
             new[name] = hold_range(time_s[valid], values[valid], new_time, oldest_range_s(period))
         elif name in HELD and valid.any():
-            longest_s = max(hold_of(name), LONGEST_BRIDGE_PERIODS * period)
+            longest_s = max(hold_of(name), GAP_PERIODS * period)
             new[name] = hold(time_s[valid], values[valid], new_time, longest_s)
         else:
             alike.setdefault(valid.tobytes(), []).append(name)
@@ -102,7 +101,7 @@ def _at(values: np.ndarray, time_s: np.ndarray, new_time: np.ndarray, period: fl
         low_pass: tuple[np.ndarray, int] | None) -> np.ndarray:
     """Channels (k, n) at the new times, (k, m); NaN in gaps longer than both limits of a bridge."""
     new = np.full((len(values), len(new_time)), np.nan)
-    bridge = max(LONGEST_BRIDGE_S, LONGEST_BRIDGE_PERIODS * period)
+    bridge = max(LONGEST_BRIDGE_S, GAP_PERIODS * period)
     bounds = np.r_[0, np.flatnonzero(np.diff(time_s) > bridge) + 1, len(time_s)]
     for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
         if stop == start:
