@@ -1,8 +1,8 @@
 """Flights and vehicle that `airtouch gap` is given: files, folders, patterns."""
 
+import filecmp
 import glob
 from collections.abc import Iterable, Iterator, Sequence
-from hashlib import sha256
 from itertools import chain
 from pathlib import Path
 
@@ -72,16 +72,15 @@ def files_of(names: Sequence[str]) -> list[Path]:
 
 def also_in(flights: Flights, baseline: Flights) -> list[Path]:
     """The flights that are baseline flights as well: the same file, or a copy of one under another name."""
-    known = {_identity(path) for path in baseline.paths}
-    return [path for path in flights.paths if _identity(path) in known]
+    return [path for path in flights.paths if any(_same(path, other) for other in baseline.paths)]
 
 
-def _identity(path: Path) -> str:
-    """Hash of a file's bytes; of a folder, and of a file that cannot be read, its absolute path."""
+def _same(path: Path, other: Path) -> bool:
+    """Whether two paths are one, or files of the same bytes, which are read only where their sizes are equal."""
     try:
-        return sha256(path.read_bytes()).hexdigest()
+        return path.resolve() == other.resolve() or filecmp.cmp(path, other, shallow=False)
     except OSError:
-        return str(path.resolve())
+        return False
 
 
 def vehicle_of(named: str | None, flights: Iterable[FlightLog], baseline: Iterable[FlightLog] = ()) -> Vehicle:
