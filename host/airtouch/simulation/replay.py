@@ -17,6 +17,7 @@ from numba import float64, njit, types
 
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import ACC, ATTITUDE, GYRO, POSITION, PWM, VELOCITY, FlightLog
+from airtouch.reference.finite import hold_finite
 from airtouch.simulation import signals as at
 from airtouch.simulation.body import battery, motors, rigid_body
 from airtouch.simulation.body.rotation import as_matrix
@@ -189,9 +190,8 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
         volts = _held(log["vbat_V"])
     effects = slots.slots(acting, [generator(seed, 0, key) for key in keys(acting, first="")])
     model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
-    commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
-    if not np.isfinite(commands).all():
-        commands = np.nan_to_num(_held(commands))  # a motor without any command is off
+    commands = np.nan_to_num(_held(log.stack(PWM) if pwm is None else pwm))  # a motor without any command is off
+    commands = np.ascontiguousarray(commands)
     _run(plant, _Log(s, commands, volts), effects, model)
     row = plant[0]
     rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
@@ -201,14 +201,11 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
 
 
 def _held(values: np.ndarray) -> np.ndarray:
-    """Values (n,) or (n, c); those that are not finite are the last one before, or the first; NaN where none is."""
-    finite = np.isfinite(values)
-    if finite.all():
+    """`hold_finite` of values (n,) or (n, c), from their first finite one on; NaN where there is none."""
+    if np.isfinite(values).all():
         return np.array(values, float)
-    rows = np.arange(len(values)).reshape(-1, *([1] * (values.ndim - 1)))
-    last = np.maximum.accumulate(np.where(finite, rows, -1), axis=0)
-    held = np.take_along_axis(values, np.where(last < 0, finite.argmax(axis=0), last), axis=0)
-    return np.where(np.isfinite(held), held, np.nan)
+    first = np.take_along_axis(values, np.isfinite(values).argmax(axis=0)[None], axis=0)[0]
+    return hold_finite(values, initial=np.where(np.isfinite(first), first, np.nan))[0]
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
