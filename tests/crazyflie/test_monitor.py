@@ -138,5 +138,5 @@ def test_an_edge_after_a_restart_is_on_the_new_track():
         monitor.take([Sample(app_log.WANTED.name, 11500, 41.5, app | {"airtouch.edges": edges, "airtouch.edge": 1})])
     assert [edge.x_m for edge in monitor.board.edges] == [2.0]
     assert monitor.board.now_s < 11.0
-    told = "10.0 s watched since the drone's last restart: no data; 1 edges ("
-    assert monitor.board.closing_line().startswith(told)
+    closing_line = "10.0 s watched since the drone's last restart: no data; 1 edges ("
+    assert monitor.board.closing_line().startswith(closing_line)

@@ -32,13 +32,13 @@ def figures(path: Path, where: str) -> dict[str, float | str]:
     try:
         table = json.loads(path.read_text())
         known = table.get("in_training")
-        wanted = {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
+        figures_of_sensor = {"of": where, **{name: round(table[name], 4) for name in FIGURES}}
     except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
         raise AirTouchError(f"{path}: not the JSON of tools/detectors/choose_decoder.py or `airtouch evaluate`: "
                             f"{error}") from None
     if known:
         raise AirTouchError(f"{path}: the model was trained on these flights; score others")
-    return wanted
+    return figures_of_sensor
 
 
 def main() -> None:

@@ -49,10 +49,10 @@ def test_wrong_units_are_a_fault_and_no_diagnosis(factors, column, remedy):
 def test_angles_and_gyro_both_in_degrees_are_told():
     """Each turns as far as the other, so that their ratio says nothing; a pitch of 4.6 rad says it all."""
     degrees = swaying(dict.fromkeys((*GYRO, *ATTITUDE), 180.0 / np.pi))
-    told = wrong_units(degrees, FLYING)
+    faults = wrong_units(degrees, FLYING)
     for column in ("roll_rad is beyond", "pitch_rad is beyond", *(f"{gyro} turns 5" for gyro in GYRO)):
-        assert any(line.startswith(column) and "multiplied by pi/180" in line for line in told), column
-    assert len(told) == 5
+        assert any(line.startswith(column) and "multiplied by pi/180" in line for line in faults), column
+    assert len(faults) == 5
     angles = wrong_units(swaying(dict.fromkeys(ATTITUDE, 180.0 / np.pi)), FLYING)
     assert angles and not any("gyro" in line for line in angles), "this gyro is in rad/s"
     many_turns = swaying().with_columns({"yaw_rad": swaying()["yaw_rad"] + T,  # counted on beyond one turn

@@ -74,8 +74,8 @@ def test_every_lost_sample_of_an_even_clock_is_counted(share):
     assert report.rate_hz == pytest.approx(100, rel=1e-6)
     resampled = logs.resample(log).meta["resampled"]
     assert resampled["lost_samples"] == report.lost and resampled["from_hz"] == pytest.approx(100, rel=1e-6)
-    told = [line for line in remarks(log) if "were lost" in line]
-    assert told == [f"{report.lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were"]
+    lines = [line for line in remarks(log) if "were lost" in line]
+    assert lines == [f"{report.lost} samples were lost beside {len(log)} logged ones; rows are taken as if none were"]
     assert not remarks(whole)
 
 

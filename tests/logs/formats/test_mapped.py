@@ -63,5 +63,5 @@ def test_rows_that_an_unclosed_quotation_mark_takes_are_told_of(tmp_path, end):
     lines[200] = lines[200].replace("9.81", '"9.81')
     log = read(tmp_path, (end.join(lines) + end).encode())
     assert len(log) == 200  # of 300
-    told = [w for w in log.meta["warnings"] if "line end" in w]
-    assert len(told) == 1 and told[0].startswith("cells with a line end in them: 1, the first '9.81,")
+    warnings = [w for w in log.meta["warnings"] if "line end" in w]
+    assert len(warnings) == 1 and warnings[0].startswith("cells with a line end in them: 1, the first '9.81,")

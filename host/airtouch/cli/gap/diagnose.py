@@ -114,7 +114,7 @@ def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | 
     table = Table("flight", "verdict", "effects", "probability")
     rows = []
     with LateBar(len(flights), "diagnosing") as bar:
-        for diagnosis in run(partial(_alone, case), _told(flights, bar)):
+        for diagnosis in run(partial(_alone, case), _named_on(bar, flights)):
             if isinstance(diagnosis, AirTouchError):
                 show.left_out([str(diagnosis)])
                 continue
@@ -131,7 +131,7 @@ def _each(flights: Any, case: Callable, with_names: Callable, json_path: Path | 
     return len(rows)
 
 
-def _told(flights: Any, bar: LateBar) -> Iterator[Any]:
+def _named_on(bar: LateBar, flights: Any) -> Iterator[Any]:
     """The flights, each named on the bar before it is diagnosed."""
     for log in flights:
         bar.now(f"diagnosing {Path(log.source).name}")

@@ -15,10 +15,13 @@ def with_names(diagnosis: Diagnosis, vehicle: str | None, real: Sequence[str], b
 
     Where there are none, or more than MOST_NAMES, the placeholder stays. Every other word stays.
     """
-    given = {"REAL": list(real), "NOMINAL...": list(baseline), FILE: [vehicle] if vehicle else []}
+    names_of = {"REAL": list(real), "NOMINAL...": list(baseline), FILE: [vehicle] if vehicle else []}
 
     def command(line: str) -> str:
-        words = [given[word] if 0 < len(given.get(word, ())) <= MOST_NAMES else [word] for word in shlex.split(line)]
-        return shlex.join([word for some in words for word in some])
+        words: list[str] = []
+        for word in shlex.split(line):
+            names = names_of.get(word, [])
+            words += names if 0 < len(names) <= MOST_NAMES else [word]
+        return shlex.join(words)
 
     return replace(diagnosis, next=tuple(replace(step, command=command(step.command)) for step in diagnosis.next))

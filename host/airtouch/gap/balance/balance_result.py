@@ -135,17 +135,17 @@ def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[
     """The probabilities with those of names that close too little at 0, and these names, the likeliest first.
 
     A weight is withdrawn in both forms. If an effect that closes enough is then the likeliest, the others add up to 1;
-    if one of NO_EFFECTS is, `unknown` takes what is free.
+    if one of NO_EFFECTS is, `unknown` takes the probability of these names.
     """
-    left, withdrawn, free = dict(probability_of), [], 0.0
-    while (first := answer_of(left)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
+    probability, withdrawn, withdrawn_probability = dict(probability_of), [], 0.0
+    while (first := answer_of(probability)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
         withdrawn.append(first)
-        free += _weights_together(first, left)[first]
-        left.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in left})
+        withdrawn_probability += _weights_together(first, probability)[first]
+        probability.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in probability})
     if first in NO_EFFECTS:
-        return {**left, "unknown": left["unknown"] + free}, withdrawn
-    total = sum(left.values()) if withdrawn else 1.0
-    return {n: p / total for n, p in left.items()}, withdrawn
+        return {**probability, "unknown": probability["unknown"] + withdrawn_probability}, withdrawn
+    total = sum(probability.values()) if withdrawn else 1.0
+    return {n: p / total for n, p in probability.items()}, withdrawn
 
 
 def _gap(verdict: str, closure: Closure) -> OverallGap:

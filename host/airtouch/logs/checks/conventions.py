@@ -57,12 +57,12 @@ def _acceleration_faults(log: FlightLog, flying: np.ndarray) -> list[str]:
     if len(lift) < FEWEST_SAMPLES:
         return []
     median = float(np.median(lift))
-    found = f"{ACC[2]}: median {median:.2f} m/s^2 in the air, where it is about {GRAVITY:g}"
+    prefix = f"{ACC[2]}: median {median:.2f} m/s^2 in the air, where it is about {GRAVITY:g}"
     faults = []
     if IN_G[0] < abs(median) < IN_G[1]:
-        faults.append(f"{found}: it is to be in m/s^2; from g it is multiplied by {GRAVITY:g}, as acc_x and acc_y are")
+        faults.append(f"{prefix}: it is to be in m/s^2; from g it is multiplied by {GRAVITY:g}, as acc_x and acc_y are")
     if median < -IN_G[0]:
-        faults.append(f"{found}: it is to be positive where the vehicle hovers (axes: x forward, y left, z up)")
+        faults.append(f"{prefix}: it is to be positive where the vehicle hovers (axes: x forward, y left, z up)")
     return faults
 
 

@@ -89,9 +89,9 @@ def read(path: str | Path, mapping: str | Path) -> FlightLog:
     ragged = sum(len(row) != len(header) for row in rows[1:])
     if ragged:
         warnings.append(f"{ragged} of {len(rows) - 1} rows have not the header's number of cells, {len(header)}")
-    swallowed = [cell for row in rows for cell in row if "\n" in cell]
-    if swallowed:
-        warnings.append(f"cells with a line end in them: {len(swallowed)}, the first '{printable(swallowed[0], 20)}': "
+    multiline = [cell for row in rows for cell in row if "\n" in cell]
+    if multiline:
+        warnings.append(f"cells with a line end in them: {len(multiline)}, the first '{printable(multiline[0], 20)}': "
                         "a quotation mark that is not closed takes the rows after it into one cell")
     columns = {}
     for name, how in table["columns"].items():
