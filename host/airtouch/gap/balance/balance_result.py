@@ -3,7 +3,7 @@
 `diagnosis` is the whole of it, in the order of `gap.balance`: measured, modelled, compared, answered.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -89,7 +89,7 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
-        control=control_of(by_evidence, first, closures) if verdict == "effect" else None,
+        control=control_of(by_evidence, [e.name for e in effects], closures) if verdict == "effect" else None,
         notes=_notes(voltage, list(probability_of), [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
@@ -153,9 +153,14 @@ def _gap(verdict: str, closure: Closure) -> OverallGap:
     return {"before": closure.before, "floor": 1.0, "after": closure.after if verdict == "effect" else closure.before}
 
 
-def control_of(probability_of: Mapping[str, float], first: str, closures: Mapping[str, Closure]) -> Control | None:
-    """The gap with a deliberately wrong effect; None where none of WRONG_IN_HOVER is surely wrong."""
-    wrong = next((n for n in WRONG_IN_HOVER if n != first and probability_of.get(n, 1.0) < WRONG_BELOW), None)
+def control_of(probability_of: Mapping[str, float], named: Collection[str], closures: Mapping[str, Closure],
+               ) -> Control | None:
+    """The gap with a deliberately wrong effect; None where none of WRONG_IN_HOVER is surely wrong.
+
+    named: the effects of the answer. None of them is wrong, nor is a weight's other form.
+    """
+    right = {*named, *(OTHER_WEIGHT[n] for n in named if n in OTHER_WEIGHT)}
+    wrong = next((n for n in WRONG_IN_HOVER if n not in right and probability_of.get(n, 1.0) < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, closures[wrong])
 
 
