@@ -90,7 +90,7 @@ def results_with(rows: list[dict], patterns: list[HoverPattern], vehicle: vehicl
     names = ["mass" if h.name == "com_offset" else h.name for h in candidates]
     for k, (row, pattern) in enumerate(zip(rows, patterns, strict=True)):
         nominal = hover_balance.reference([patterns[i] for i in baseline(rows, k)], priors)
-        logs, weights = hover_balance.evidence(pattern, nominal, candidates, priors)
+        logs, weights = hover_balance.evidence(nominal.difference(pattern), nominal, candidates, priors)
         first = likeliest(logs, names)
         i = max((i for i, h in enumerate(candidates) if h.name == first), key=logs.__getitem__)
         effects = [{"name": n, "parameters": {k: {"value": float(weights[i] @ v)} for k, v in samples.items()}}

@@ -6,7 +6,7 @@ import pytest
 from airtouch import vehicle
 from airtouch.gap.balance.hover_balance import ANSWER, POWER, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses, weight_change
-from airtouch.gap.balance.hover_pattern import HoverPattern
+from airtouch.gap.balance.hover_pattern import NO_HOVER, HoverPattern
 from airtouch.gap.balance.hover_posterior import answer_of, probabilities
 from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
 from airtouch.gap.diagnosis import diagnose
@@ -33,7 +33,7 @@ def commanded(thrusts: np.ndarray) -> HoverPattern:
 
 def best(pattern: HoverPattern) -> tuple:
     explanations = hypotheses(FLOWN)
-    logs, weights = evidence(pattern, NOMINAL, explanations)
+    logs, weights = evidence(NOMINAL.difference(pattern), NOMINAL, explanations)
     i = int(np.argmax(logs))
     return explanations[i], weights[i]
 
@@ -84,7 +84,7 @@ def test_one_number_alone_that_is_far_off_is_no_nominal_flight(number, change):
 def test_more_lift_alone_is_a_weight_at_the_centre(fraction):
     change = weight_change(np.array([fraction]), np.zeros(1), np.zeros(1), FLOWN.arm_m)[0]
     candidates = hypotheses(FLOWN)
-    of_each = probabilities(evidence(pattern(change), NOMINAL, candidates), candidates)
+    of_each = probabilities(evidence(NOMINAL.difference(pattern(change)), NOMINAL, candidates), candidates)
     assert answer_of(of_each)[0] == "mass" and of_each["unknown"] < 0.05
 
 
@@ -95,9 +95,17 @@ def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
     base = reference(table[:3])
     np.testing.assert_allclose(base.own_power, own, atol=1e-9)
     np.testing.assert_allclose(base.difference(table[3]), np.zeros(6), atol=1e-9)
+    np.testing.assert_allclose(base.mean_difference(table), np.zeros(6), atol=1e-9)  # together, too
     without_velocity = [pattern(np.zeros(4), power) for power in powers]
     np.testing.assert_allclose(reference(without_velocity[:3]).difference(without_velocity[3])[POWER],
                                powers[3] - powers[:3].mean(axis=0), atol=1e-3)
+
+
+def test_the_mean_is_that_of_the_flights_with_a_hover():
+    """By hand; a flight without one takes no part."""
+    lift, turn = pattern([0.1, 0.0, 0.0, 0.0], power=(0.2, 0.0)), pattern([0.0, 0.0, 0.0, 0.3])
+    np.testing.assert_allclose(NOMINAL.mean_difference([lift, NO_HOVER, turn]), [0.05, 0.0, 0.0, 0.15, 0.1, 0.0],
+                               atol=1e-6)
 
 
 def test_prior_probabilities_add_up_to_one_over_names_and_over_hypotheses():

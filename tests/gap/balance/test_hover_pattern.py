@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.balance.hover_hypotheses import commanded_change
-from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, mean_pattern, stretches_in_air
+from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, stretches_in_air
 from airtouch.gap.balance.hover_posterior import side_is_sure
 from airtouch.logs.flight_log import VELOCITY
 from gap_flights import VEHICLE, flight, noise
@@ -81,11 +81,6 @@ def test_what_is_left_beside_a_hole_lasts_four_seconds(samples, count):
     lost[round(100 * SETTLE_S) + samples:] = True
     hover = replace(noisy(), lost=lost)
     assert len(stretches_in_air(hover)) == count and hover_pattern(hover, VEHICLE).known == bool(count)
-
-
-def test_a_flight_without_a_hover_takes_no_part_in_the_mean():
-    one, none = (hover_pattern(noisy(seconds), VEHICLE) for seconds in (SECONDS, 3.0))
-    np.testing.assert_array_equal(mean_pattern([one, none]).array(), one.array())
 
 
 @pytest.mark.parametrize(("right", "sure"), [(0.95, True), (0.85, False), (0.15, False), (0.05, True)])

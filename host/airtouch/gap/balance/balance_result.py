@@ -14,7 +14,7 @@ from airtouch.gap.answer.shrink import fraction_closed
 from airtouch.gap.answer.words import joined
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
-from airtouch.gap.balance.hover_pattern import hover_pattern, mean_pattern, share_not_logged
+from airtouch.gap.balance.hover_pattern import hover_pattern, share_not_logged
 from airtouch.gap.balance.hover_posterior import (
     HIGH,
     LOW,
@@ -63,17 +63,17 @@ def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehic
 
 def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
               notes: Sequence[str] = (), without: Iterable[str] = (), pictures: bool = False) -> Diagnosis:
-    """Which of the hypotheses of `hover_hypotheses` the flights' mean pattern fits best.
+    """Which of the hypotheses of `hover_hypotheses` the flights' mean difference from nominal ones fits best.
 
     notes: on logs left out; without: names that are no candidates; pictures: whether to keep a report's curves.
     """
     voltage = all(f.log.has("vbat_V") for f in (*flights, *nominal))
     base = reference([hover_pattern(f, vehicle, voltage) for f in nominal])
-    pattern = mean_pattern([hover_pattern(f, vehicle, voltage) for f in flights])
-    gap = base.difference(pattern)[BALANCE]
+    difference = base.mean_difference([hover_pattern(f, vehicle, voltage) for f in flights])
+    gap = difference[BALANCE]
 
     candidates = hypotheses(vehicle, without=set(without))
-    judged = evidence(pattern, base, candidates)
+    judged = evidence(difference, base, candidates)
     by_evidence = probabilities(judged, candidates)
     fits = {name: likeliest_of(name, candidates, judged) for name in by_evidence}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}

@@ -40,6 +40,14 @@ class Reference:
         """BALANCE and POWER (6,) of a pattern from the nominal flights' mean, powers over what corrections cause."""
         return _over_caused([pattern], self.own_power)[0] - self.mean
 
+    def mean_difference(self, patterns: Sequence[HoverPattern]) -> np.ndarray:
+        """Mean `difference` (6,) of the patterns of flights that have a hover; at least one has.
+
+        Each flight's powers are held against its own corrections: what these cause on average is more than what
+        their mean logarithm would.
+        """
+        return np.mean([self.difference(p) for p in patterns if p.known], axis=0)
+
 
 def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Reference:
     """Mean of nominal flights that have a hover, and the variance of a further one about it.
@@ -58,7 +66,7 @@ def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Refe
 
 
 class Evidence(NamedTuple):
-    """How likely each of some hypotheses makes a pattern.
+    """How likely each of some hypotheses makes a difference from nominal flights.
 
     log (hypotheses,): logarithm of the evidence, its prior probability included, nats, without the constants that all
     share; weights: of the samples of each (samples,), of sum 1.
@@ -68,10 +76,9 @@ class Evidence(NamedTuple):
     weights: list[np.ndarray]
 
 
-def evidence(pattern: HoverPattern, base: Reference, candidates: Sequence[Hypothesis],
+def evidence(difference: np.ndarray, base: Reference, candidates: Sequence[Hypothesis],
              priors: Priors = PRIORS) -> Evidence:
-    """The evidence of each hypothesis for a pattern."""
-    difference = base.difference(pattern)
+    """The evidence of each hypothesis for the difference (6,) of flights from the nominal ones, BALANCE and POWER."""
     of_each, weights = [], []
     for h in candidates:
         variance = base.variance[BALANCE] + (np.array(priors.maintenance) ** 2 if h.after_maintenance else 0.0)

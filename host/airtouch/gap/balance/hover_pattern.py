@@ -58,13 +58,6 @@ class HoverPattern:
 NO_HOVER = HoverPattern(np.full(4, np.nan), np.full(2, np.nan), np.full(2, np.nan))
 
 
-def mean_pattern(patterns: Sequence[HoverPattern]) -> HoverPattern:
-    """Mean of the patterns of flights that have a hover; at least one has."""
-    balance, power, corrections = (np.nanmean(np.array(values), axis=0) for values in (
-        [p.balance for p in patterns], [p.power for p in patterns], [p.corrections for p in patterns]))
-    return HoverPattern(balance, power, corrections)
-
-
 class _Stretch(NamedTuple):
     """One hover: mean of the mixed thrust (4,), log10 powers, variance of the corrections along x, y and z (3,).
 

@@ -182,5 +182,6 @@ def family_shares(b: Balances, vehicle: Vehicle) -> Iterator[tuple[str, dict[str
         for kind, changes in changes_of.items():
             patterns = (drawn_pattern(kind, changes, base.variance, generator) for _ in range(FLIGHTS))
             right[kind] = float(np.mean([
-                likeliest(hover_balance.evidence(p, reference, candidates)[0], families) == kind for p in patterns]))
+                likeliest(hover_balance.evidence(reference.difference(p), reference, candidates)[0], families) == kind
+                for p in patterns]))
         yield drone, right
