@@ -13,6 +13,7 @@ from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
+from airtouch.logs.flight_log import VELOCITY
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, flight, noise
 
@@ -82,11 +83,12 @@ def test_a_weight_off_centre_has_a_control_that_it_is_not():
 
 
 def hovering(seed, lift=1.0):
-    """A hover without a gyro whose rotors all give `lift` times the thrust at a command of 40000."""
+    """A hover without a gyro whose rotors all give `lift` times the thrust at a command of 40000; it stands still."""
     made = flight(20.0, noise(20.0, 0.1, seed), name=str(seed))
     commands = np.linspace(0.0, 65535.0, 3000)
     level = np.interp(lift * VEHICLE.thrust(np.array([40000.0]))[0], VEHICLE.thrust(commands), commands)
-    return replace(made, rates=None, pwm=level + np.random.default_rng(seed).normal(0.0, 300.0, made.pwm.shape))
+    pwm = level + np.random.default_rng(seed).normal(0.0, 300.0, made.pwm.shape)
+    return replace(made, rates=None, log=made.log.with_columns(dict.fromkeys(VELOCITY, np.zeros(len(made)))), pwm=pwm)
 
 
 @pytest.mark.parametrize(("left_out", "named"), [((), True), (("com_offset",), True), (("mass",), False)])

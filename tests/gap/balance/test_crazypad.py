@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle
+from airtouch.gap.balance.balance_result import NO_VELOCITY, UNSTEADINESS
 from airtouch.gap.balance.hover_balance import ANSWER, POWER, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses, weight_change
 from airtouch.gap.balance.hover_pattern import NO_HOVER, HoverPattern
@@ -11,7 +12,7 @@ from airtouch.gap.balance.hover_posterior import answer_of, probabilities
 from airtouch.gap.balance.priors import PRIOR_PROBABILITY, PRIORS
 from airtouch.gap.diagnosis import diagnose
 from airtouch.logs import read
-from airtouch.logs.flight_log import FlightLog
+from airtouch.logs.flight_log import VELOCITY, FlightLog
 from airtouch.simulation import replay
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects import Active, get
@@ -96,9 +97,27 @@ def test_power_that_corrections_of_the_estimate_cause_is_nobodys():
     np.testing.assert_allclose(base.own_power, own, atol=1e-9)
     np.testing.assert_allclose(base.difference(table[3]), np.zeros(6), atol=1e-9)
     np.testing.assert_allclose(base.mean_difference(table), np.zeros(6), atol=1e-9)  # together, too
-    without_velocity = [pattern(np.zeros(4), power) for power in powers]
-    np.testing.assert_allclose(reference(without_velocity[:3]).difference(without_velocity[3])[POWER],
+    uncorrected = [pattern(np.zeros(4), power) for power in powers]
+    np.testing.assert_allclose(reference(uncorrected[:3]).difference(uncorrected[3])[POWER],
                                powers[3] - powers[:3].mean(axis=0), atol=1e-3)
+
+
+@pytest.mark.parametrize("place", ["nominal", "one nominal", "flight", "one flight"])
+def test_where_a_velocity_is_missing_unsteadiness_is_no_evidence(place):
+    """Whatever the powers, the answer is that of flights as steady as the nominal ones and of the same balance."""
+    def shaken(missing, powers):
+        return pattern([0.05, 0.03, 0.0, 0.0], powers, (np.nan, np.nan) if missing else UNCORRECTED)
+
+    nominal = [shaken(place == "nominal" or place == "one nominal" and i == 0, (0.0, 0.1 * i)) for i in range(3)]
+    candidates = hypotheses(FLOWN)
+    logs = []
+    for power in (-2.0, 0.0, 2.0):
+        flights = [shaken(place == "flight" or place == "one flight" and i == 0, (power, power)) for i in range(2)]
+        base = reference(nominal)
+        logs.append(evidence(base.mean_difference(flights), base, candidates).log)
+    np.testing.assert_array_equal(logs[0], logs[1])
+    np.testing.assert_array_equal(logs[2], logs[1])
+    assert np.isfinite(logs[0]).all()
 
 
 def test_the_mean_is_that_of_the_flights_with_a_hover():
@@ -178,6 +197,19 @@ def test_a_further_normal_flight_is_none(pad, nominal):
 def test_a_normal_flight_whose_position_was_measured_badly_is_none(pad, nominal):
     result = diagnose([pad("normal_flight_E8_log03")], FLOWN, nominal["E8"][:3])  # 18 times their corrections
     assert (result.verdict, result.effects) == ("none", ())
+
+
+@pytest.mark.parametrize("all_lack_it", [False, True])
+def test_the_same_flight_without_velocity_is_none(pad, nominal, all_lack_it):
+    """Its unsteadiness, of the position alone, was a weak motor at 95 %."""
+    def without_velocity(log):
+        return FlightLog({k: v for k, v in log.columns.items() if k not in VELOCITY}, log.meta)
+
+    base = nominal["E8"][:3]
+    result = diagnose([without_velocity(pad("normal_flight_E8_log03"))], FLOWN,
+                      [without_velocity(log) for log in base] if all_lack_it else base)
+    assert (result.verdict, result.effects) == ("none", ())
+    assert NO_VELOCITY in result.notes and UNSTEADINESS not in result.notes[0]
 
 
 def test_a_normal_flight_of_whose_hover_five_seconds_are_lost_is_none(pad, nominal):

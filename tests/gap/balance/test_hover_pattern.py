@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.balance.hover_hypotheses import commanded_change
-from airtouch.gap.balance.hover_pattern import LEAST_POWER, SETTLE_S, hover_pattern, stretches_in_air
+from airtouch.gap.balance.hover_pattern import SETTLE_S, hover_pattern, stretches_in_air
 from airtouch.gap.balance.hover_posterior import side_is_sure
 from airtouch.logs.flight_log import VELOCITY
 from gap_flights import VEHICLE, flight, noise
@@ -46,7 +46,26 @@ def test_corrections_are_the_steps_of_the_velocity_that_no_acceleration_makes(lo
     with np.errstate(divide="ignore"):  # heave of a constant acceleration
         corrections = hover_pattern(hover, VEHICLE).corrections
     np.testing.assert_allclose(10.0 ** corrections, [4e-4, 2e-4], rtol=0.15)  # two and one axis, twice the variance
-    assert hover_pattern(noisy(), VEHICLE).corrections.tolist() == [LEAST_POWER, LEAST_POWER], "no velocity"
+
+
+@pytest.mark.parametrize("period", [0, 4])
+def test_without_velocities_in_succession_the_corrections_are_not_known(period):
+    """No column, or a velocity in one row of four: zeros would say that nothing was corrected."""
+    velocity = np.full((round(100 * SECONDS), 3), np.nan)
+    if period:
+        velocity[::period] = 0.1
+    hover = hover_pattern(noisy(**dict(zip(VELOCITY, velocity.T, strict=True)) if period else {}), VEHICLE)
+    assert hover.known and np.isnan(hover.corrections).all()
+
+
+def test_a_stretch_without_velocities_takes_no_part_in_the_corrections():
+    hole, velocity = np.zeros(round(100 * SECONDS), bool), noise(SECONDS, 0.01, 3)
+    hole[900:1100] = True
+    whole, half = velocity.copy(), velocity.copy()
+    half[1100:] = np.nan
+    of_whole, of_half = (hover_pattern(replace(noisy(**dict(zip(VELOCITY, v.T, strict=True))), lost=hole),
+                                       VEHICLE).corrections for v in (whole, half))
+    np.testing.assert_allclose(of_half, of_whole, atol=0.05)  # with zeros for the second half, 0.3 less
 
 
 @pytest.mark.parametrize(("seconds", "count"), [(3.9, 0), (4.1, 1)])

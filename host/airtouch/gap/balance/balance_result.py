@@ -44,12 +44,15 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
 NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
-NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included, and how unsteady "
-           "it is; the only effects tried are {}")
+NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; the only "
+           "effects tried are {}")
+UNSTEADINESS = ", and how unsteady it is"  #: in NO_GYRO, where that is judged
 OWN_NOT_TRIED = "effects of your own are not tried where flights have no gyro and hovers are judged: {}"
 NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
               "effect named for that")
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
+NO_VELOCITY = ("no velocity in some flights: how unsteady flights are is not judged, as it depends on how the "
+               "estimated velocity is corrected")
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
@@ -90,7 +93,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(by_evidence, [e.name for e in effects], closures) if verdict == "effect" else None,
-        notes=_notes(voltage, list(probability_of), [*notes, *_not_logged([*flights, *nominal])]),
+        notes=_notes(voltage, bool(np.isfinite(difference).all()), list(probability_of),
+                     [*notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -222,14 +226,15 @@ def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | 
     return tuple(sorted(cells, key=lambda c: -c.ratio))
 
 
-def _notes(voltage: bool, tried: Sequence[str], notes: Sequence[str]) -> tuple[str, ...]:
-    """Notes of every such diagnosis before those given. voltage: whether all flights log the battery's.
+def _notes(voltage: bool, velocity: bool, tried: Sequence[str], notes: Sequence[str]) -> tuple[str, ...]:
+    """Notes of every such diagnosis before those given.
 
-    tried: names of the candidates.
+    voltage, velocity: whether all flights log that of the battery, and their own; tried: names of the candidates.
     """
     effects, own = [n for n in tried if n not in NO_EFFECTS], [n for n in EFFECTS if n not in NAMES]
-    return (NO_GYRO.format(joined(effects)), *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
-            *([] if voltage else [NO_VOLTAGE]))
+    return (NO_GYRO.format(UNSTEADINESS if velocity else "", joined(effects)),
+            *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
+            *([] if voltage else [NO_VOLTAGE]), *([] if velocity else [NO_VELOCITY]))
 
 
 def _not_logged(flights: Sequence[Flight]) -> list[str]:

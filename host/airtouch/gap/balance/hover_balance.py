@@ -4,7 +4,8 @@ Evidence integrates the likelihood over each hypothesis' prior, so that a hypoth
 
 How unsteady a flight is says little of the vehicle unless the position is measured equally well: the controllers answer
 every correction of the estimated velocity. Their expected power is own + ANSWER x variance of the corrections, which
-the log shows; what is judged is the log10 of the power over that.
+the log shows; what is judged is the log10 of the power over that. Where one flight has no velocity, the balance alone
+is judged.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,8 @@ BALANCE, POWER = slice(0, 4), slice(4, 6)  #: of the six numbers of a pattern th
 class Reference:
     """Nominal flights: mean (6,) and variance (6,) of BALANCE and POWER of a further nominal flight of any session.
 
-    own_power (2,): log10 of the power of unsteadiness and heave that no correction of the estimate causes.
+    own_power (2,): log10 of the power of unsteadiness and heave that no correction of the estimate causes. It and
+    the numbers of POWER are NaN where a nominal flight has no velocity.
     """
 
     mean: np.ndarray
@@ -37,7 +39,10 @@ class Reference:
     own_power: np.ndarray
 
     def difference(self, pattern: HoverPattern) -> np.ndarray:
-        """BALANCE and POWER (6,) of a pattern from the nominal flights' mean, powers over what corrections cause."""
+        """BALANCE and POWER (6,) of a pattern from the nominal flights' mean, powers over what corrections cause.
+
+        POWER is NaN where the flight, or a nominal one, has no velocity.
+        """
         return _over_caused([pattern], self.own_power)[0] - self.mean
 
     def mean_difference(self, patterns: Sequence[HoverPattern]) -> np.ndarray:
@@ -78,12 +83,16 @@ class Evidence(NamedTuple):
 
 def evidence(difference: np.ndarray, base: Reference, candidates: Sequence[Hypothesis],
              priors: Priors = PRIORS) -> Evidence:
-    """The evidence of each hypothesis for the difference (6,) of flights from the nominal ones, BALANCE and POWER."""
+    """The evidence of each hypothesis for the difference (6,) of flights from the nominal ones, BALANCE and POWER.
+
+    Where POWER is NaN, of BALANCE alone.
+    """
+    steadiness_known = bool(np.isfinite(difference[POWER]).all())
     of_each, weights = [], []
     for h in candidates:
         variance = base.variance[BALANCE] + (np.array(priors.maintenance) ** 2 if h.after_maintenance else 0.0)
         log, weight = _of_balance(h, difference[BALANCE], variance, priors.freedom)
-        of_each.append(_with_power(log, h, difference[POWER], base.variance[POWER]))
+        of_each.append(_with_power(log, h, difference[POWER], base.variance[POWER]) if steadiness_known else log)
         weights.append(weight)
     return Evidence(np.array(of_each), weights)
 
@@ -123,7 +132,13 @@ def _over_caused(patterns: Sequence[HoverPattern], own_power: np.ndarray) -> np.
 
 
 def _own_power(power: np.ndarray, caused: np.ndarray) -> float:
-    """log10 of the power that flights have beside the one that is caused; power (flights,) log10, caused (flights,)."""
+    """log10 of the power that flights have beside the one that is caused; NaN where one of the latter is not known.
+
+    power (flights,): log10; caused (flights,).
+    """
+    if not np.isfinite(caused).all():
+        return np.nan
+
     def mean_over(own: float) -> float:
         """Mean log10 of the power over the expected one."""
         return float(np.mean(power - np.log10(10.0 ** own + caused)))

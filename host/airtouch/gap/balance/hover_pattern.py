@@ -33,12 +33,12 @@ LEAST_POWER = -9.0  #: log10 of a power or of a variance; nothing logged is belo
 
 @dataclass(frozen=True)
 class HoverPattern:
-    """The hovers of one flight in eight numbers; NaN where it has none.
+    """The hovers of one flight in eight numbers, NaN where they are not known.
 
     balance (4,): logarithm of the lift, in units of the weight (at 1 V where the voltage is logged); roll, pitch and
     yaw over the lift. power (2,): log10 of the power of unsteadiness (1/Hz) and heave (m^2/s^4/Hz).
     corrections (2,): log10 of the variance by which the estimated velocity is corrected, (m/s)^2, sideways and upwards;
-    LEAST_POWER where the log has no velocity.
+    NaN where the log has no velocity.
     """
 
     balance: np.ndarray
@@ -47,8 +47,8 @@ class HoverPattern:
 
     @property
     def known(self) -> bool:
-        """Whether the flight has a hover in which all eight numbers are known."""
-        return bool(np.isfinite(self.array()).all())
+        """Whether the flight has a hover in which balance and power are known."""
+        return bool(np.isfinite([*self.balance, *self.power]).all())
 
     def array(self) -> np.ndarray:
         """The eight numbers, (8,)."""
@@ -61,7 +61,7 @@ NO_HOVER = HoverPattern(np.full(4, np.nan), np.full(2, np.nan), np.full(2, np.na
 class _Stretch(NamedTuple):
     """One hover: mean of the mixed thrust (4,), log10 powers, variance of the corrections along x, y and z (3,).
 
-    The powers are NaN where it has fewer than LEAST_SPECTRUM.
+    The powers are NaN where it has fewer than LEAST_SPECTRUM, the corrections where fewer than two are known.
     """
 
     samples: int
@@ -83,17 +83,17 @@ def hover_pattern(flight: Flight, vehicle: Vehicle, at_one_volt: bool = True) ->
         return NO_HOVER
     samples = [s.samples for s in stretches]
     mean = np.average([s.mixed for s in stretches], axis=0, weights=samples)
-    power = [_mean_power([s.unsteadiness for s in stretches], samples),
-             _mean_power([s.heave for s in stretches], samples)]
-    x, y, z = np.average([s.corrections for s in stretches], axis=0, weights=samples)
+    power = [_mean_of_known([s.unsteadiness for s in stretches], samples),
+             _mean_of_known([s.heave for s in stretches], samples)]
+    x, y, z = (_mean_of_known([s.corrections[axis] for s in stretches], samples) for axis in range(3))
     return HoverPattern(np.array([np.log(mean[0]), *(mean[1:] / mean[0])]), np.array(power),
                         np.log10(np.maximum([x + y, z], 10.0 ** LEAST_POWER)))
 
 
-def _mean_power(log_power: Sequence[float], samples: Sequence[int]) -> float:
-    """Mean of the log10 powers of stretches, weighted by their samples; NaN where none is long enough for one."""
-    known = np.isfinite(log_power)
-    return float(np.average(np.array(log_power)[known], weights=np.array(samples)[known])) if known.any() else np.nan
+def _mean_of_known(values: Sequence[float], samples: Sequence[int]) -> float:
+    """Mean of a number of stretches, weighted by their samples; NaN where it is known of none."""
+    known = np.isfinite(values)
+    return float(np.average(np.array(values)[known], weights=np.array(samples)[known])) if known.any() else np.nan
 
 
 def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
@@ -139,12 +139,9 @@ def _mixed_thrust(flight: Flight, vehicle: Vehicle, at_one_volt: bool) -> np.nda
 
 
 def _stretch(mixed: np.ndarray, upwards: np.ndarray, corrections: np.ndarray) -> _Stretch:
-    """One hover, from mixed thrust (n, 4), vertical acceleration (n,) and corrections of the velocity (n - 1, 3).
-
-    A hover of whose velocity no two rows in succession are known has no correction, as one without velocity.
-    """
+    """One hover, from mixed thrust (n, 4), vertical acceleration (n,) and corrections of the velocity (n - 1, 3)."""
     known = corrections[np.isfinite(corrections).all(axis=1)]
-    variance = known.var(axis=0) if len(known) else np.zeros(3)
+    variance = known.var(axis=0) if len(known) > 1 else np.full(3, np.nan)
     unsteadiness, heave = _log_powers(mixed, upwards) if len(mixed) >= LEAST_SPECTRUM else (np.nan, np.nan)
     return _Stretch(len(mixed), mixed.mean(axis=0), unsteadiness, heave, variance)
 
@@ -170,10 +167,10 @@ def _unsteadiness(f: np.ndarray, power: np.ndarray) -> float:
 def _corrections(flight: Flight) -> np.ndarray:
     """What the estimated velocity changes from row to row beyond the acceleration, m/s (n - 1, 3).
 
-    Each has the same share of gravity. NaN beside a row in which a velocity was lost; zeros where the log has none.
+    Each has the same share of gravity. NaN beside a row in which a velocity was lost, and where the log has none.
     """
     if not all(flight.log.has(name) for name in VELOCITY):
-        return np.zeros((len(flight) - 1, 3))
+        return np.full((len(flight) - 1, 3), np.nan)
     velocity = np.column_stack([flight.log[name] for name in VELOCITY])
     world = np.einsum("nij,nj->ni", flight.body_to_world, flight.acceleration)
     return np.diff(velocity, axis=0) - 0.5 * PERIOD_S * (world[1:] + world[:-1])
