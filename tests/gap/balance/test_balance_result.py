@@ -161,6 +161,20 @@ def test_a_gap_that_stands_out_must_close_by_a_quarter(before, shrink, too_littl
     assert balance_result.closes_too_little(Closure(before, 1.0, Quantity(shrink))) == too_little
 
 
+@pytest.mark.parametrize(("after", "too_little"), [(1.02, False), (1.03, False), (1.04, True)])
+def test_an_effect_that_makes_a_gap_at_the_floor_larger_closes_too_little(after, too_little):
+    assert balance_result.closes_too_little(Closure(1.03, after, Quantity(0.0))) == too_little
+
+
+def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor():
+    """Commands twice as unsteady about the nominal mean: a weak motor is likely by that, and makes the gap larger."""
+    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(4)
+    mean = odd.pwm.mean(axis=0)
+    result = balance_result.diagnosis([replace(odd, pwm=mean + 2.0 * (odd.pwm - mean))], nominal, VEHICLE)
+    assert (result.verdict, result.effects) == ("unknown", ())
+    assert next(r for r in result.ranking if r.name == "weak_motor").probability == 0.0
+
+
 CLOSES = {"none": 0.0, "weak_motor": 0.74, "mass": 0.23, "slung_load": 0.1, "com_offset": 0.2, "unknown": 0.6}
 EVIDENCE = {"none": 0.05, "weak_motor": 0.3, "mass": 0.35, "slung_load": 0.15, "com_offset": 0.1, "unknown": 0.05}
 

@@ -128,10 +128,13 @@ def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
 def closes_too_little(closure: Closure) -> bool:
     """Whether an effect closes less than LEAST_CLOSED of a gap over STANDS_OUT, too little to be its cause.
 
-    The tails of the likelihood forgive one number of the balance that is far off, however far: an effect may be much
-    more probable than the others, and leave the gap as it is.
+    Of a smaller gap it need close nothing, but must not make it larger. The tails of the likelihood forgive one number
+    of the balance that is far off, however far: an effect may be much more probable than the others, and leave the gap
+    as it is.
     """
-    return closure.before > STANDS_OUT and closure.shrink.value < LEAST_CLOSED
+    if closure.before <= STANDS_OUT:
+        return closure.after > closure.before
+    return closure.shrink.value < LEAST_CLOSED
 
 
 def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
