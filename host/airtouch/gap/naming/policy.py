@@ -108,11 +108,11 @@ CHANCE_LOSS = 1.0
 
 # -- What names must close of the gap of recorded flights --
 
-#: share of the gap that an effect of the loop, or one that passes, must close: as much as the loop model may be wrong
-#: by, `torque_power.TORQUE_DOUBT`; chosen
+#: share of the gap that an effect of the loop, one that passes, or any that is named without a gyro must close: as much
+#: as the loop model may be wrong by, `torque_power.TORQUE_DOUBT`; chosen
 LEAST_CLOSED = 0.25
-#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing; chosen. An effect that
-#: passes may leave so small a gap, as the two halves of the data seldom share its seconds
+#: gap, in units of the floor, up to which an effect that is not of the loop need close nothing, also without a gyro;
+#: chosen. An effect that passes may leave so small a gap, as the two halves of the data seldom share its seconds
 STANDS_OUT = 1.1
 
 
