@@ -91,6 +91,20 @@ def hovering(seed, lift=1.0):
     return replace(made, rates=None, log=made.log.with_columns(dict.fromkeys(VELOCITY, np.zeros(len(made)))), pwm=pwm)
 
 
+def test_hovers_are_judged_where_no_flight_has_a_gyro_and_both_kinds_hover():
+    """Of each kind one that hovers is enough; a gyro in any flight rules it out."""
+    hover = hovering(1)
+    short, turning = flight(3.0, noise(3.0, 0.1, 2)), replace(hover, rates=np.zeros((len(hover), 3)))
+    short = replace(short, rates=None)
+
+    def applies(flights, nominal):
+        return balance_result.applies(flights, nominal, VEHICLE)
+
+    assert applies([hover], [hover]) and applies([hover, short], [short, hover])
+    assert not applies([hover, turning], [hover])
+    assert not applies([short], [hover]) and not applies([hover], [short]) and not applies([hover], [])
+
+
 @pytest.mark.parametrize(("left_out", "named"), [((), True), (("com_offset",), True), (("mass",), False)])
 def test_a_centred_weight_is_named_unless_it_is_left_out_itself(left_out, named):
     """15 % more lift: with the shift of the centre left out, a weight that shifts none is still a candidate."""

@@ -56,7 +56,7 @@ NO_VELOCITY = ("no velocity in some flights: how unsteady flights are is not jud
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
-    """Whether no flight has a gyro, and both nominal and other ones hover for long enough."""
+    """Whether none of the flights has a gyro, and both one of them and a nominal one hover for long enough."""
     def any_hovers(flights_of_one_kind: Sequence[Flight]) -> bool:
         """Whether one of the flights has a hover."""
         return any(hover_pattern(f, vehicle).known for f in flights_of_one_kind)
