@@ -11,6 +11,7 @@ from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
 from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
+from airtouch.gap.balance.hover_ranking import closes_too_little, ranking_of, with_names_withdrawn
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
 from airtouch.logs.flight_log import VELOCITY
@@ -37,14 +38,14 @@ def test_a_weight_on_the_vehicle_and_off_centre_count_as_one(total, answer):
 
 def test_the_other_name_of_a_weight_is_counted_with_the_answer():
     closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("none", "mass", "com_offset")}
-    ranking = balance_result.ranking_of("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, closures)
+    ranking = ranking_of("mass", {"none": 0.2, "mass": 0.5, "com_offset": 0.3}, closures)
     assert [(r.name, round(r.probability, 6)) for r in ranking] == [("mass", 0.8), ("none", 0.2), ("com_offset", 0.0)]
     assert ranking[2].why.startswith("counted with mass") and ranking[1].why == "4 times less probable than mass"
 
 
 def test_a_weight_whose_probability_underflows_is_not_counted_with_another_effect():
     closures = {n: Closure(3.0, 1.0, Quantity(1.0)) for n in ("slung_load", "mass")}
-    ranking = balance_result.ranking_of("slung_load", {"slung_load": 1.0, "mass": 0.0}, closures)
+    ranking = ranking_of("slung_load", {"slung_load": 1.0, "mass": 0.0}, closures)
     assert ranking[1].why.endswith("times less probable than slung_load")
 
 
@@ -172,12 +173,12 @@ def test_effects_of_ones_own_are_said_not_to_be_tried_and_are_not_advised():
     (STANDS_OUT + 0.1, LEAST_CLOSED - 0.01, True), (STANDS_OUT + 0.1, LEAST_CLOSED, False),
     (STANDS_OUT, 0.0, False), (3.0, -0.2, True)])
 def test_a_gap_that_stands_out_must_close_by_a_quarter(before, shrink, too_little):
-    assert balance_result.closes_too_little(Closure(before, 1.0, Quantity(shrink))) == too_little
+    assert closes_too_little(Closure(before, 1.0, Quantity(shrink))) == too_little
 
 
 @pytest.mark.parametrize(("after", "too_little"), [(1.02, False), (1.03, False), (1.04, True)])
 def test_an_effect_that_makes_a_gap_at_the_floor_larger_closes_too_little(after, too_little):
-    assert balance_result.closes_too_little(Closure(1.03, after, Quantity(0.0))) == too_little
+    assert closes_too_little(Closure(1.03, after, Quantity(0.0))) == too_little
 
 
 def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor():
@@ -203,7 +204,7 @@ EVIDENCE = {"none": 0.05, "weak_motor": 0.3, "mass": 0.35, "slung_load": 0.15, "
 def test_a_name_withdrawn_leaves_the_answer_to_the_next_that_closes_enough(closes, evidence, names, left):
     """Shares of what is left, by hand; where no effect comes next, `unknown` has what was withdrawn."""
     closures = {n: Closure(3.0, 1.0, Quantity(c)) for n, c in {**CLOSES, **closes}.items()}
-    probability_of, withdrawn = balance_result.with_names_withdrawn({**EVIDENCE, **evidence}, closures)
+    probability_of, withdrawn = with_names_withdrawn({**EVIDENCE, **evidence}, closures)
     assert withdrawn == names
     assert {n: p for n, p in probability_of.items() if p} == pytest.approx(left)
 
@@ -222,7 +223,7 @@ def test_two_weak_rotors_are_named_though_a_weight_is_more_probable_and_closes_l
 
 def test_the_other_form_of_a_weight_that_is_withdrawn_is_counted_with_it():
     closures = {n: Closure(3.0, 2.0, Quantity(0.1)) for n in ("unknown", "mass", "com_offset")}
-    rows = balance_result.ranking_of("unknown", {"mass": 0.0, "com_offset": 0.0, "unknown": 1.0}, closures, ["mass"])
+    rows = ranking_of("unknown", {"mass": 0.0, "com_offset": 0.0, "unknown": 1.0}, closures, ["mass"])
     assert [r.name for r in rows] == ["unknown", "mass", "com_offset"] and rows[2].why.startswith("counted with mass")
 
 

@@ -16,8 +16,8 @@ log10 power of two motions, unsteadiness of the commands and heave.
 of a hypothesis is its prior probability times the mean over its samples of a Student likelihood of b, times the normal
 likelihood of the powers (Bayes factors: MacKay, Information Theory, Inference, and Learning Algorithms, 2003, chapter
 28). The evidences of all hypotheses of one name over the sum of all is the probability of that name, and the samples
-weighted by their likelihood give its parameters (`hover_posterior`). `balance_result` fills the diagnosis, and
-withdraws names that close too little of the gap.
+weighted by their likelihood give its parameters (`hover_posterior`). `hover_ranking` withdraws names that
+close too little of the gap, and `balance_result` fills the diagnosis.
 
 Figures on recorded flights: host/docs/gap-crazypad.md.
 """

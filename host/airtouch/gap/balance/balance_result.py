@@ -27,11 +27,11 @@ from airtouch.gap.balance.hover_posterior import (
     probabilities,
     quantile,
 )
+from airtouch.gap.balance.hover_ranking import NO_EFFECTS, ranking_of, with_names_withdrawn
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
-from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RankedCandidate
+from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity
 from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
@@ -39,11 +39,10 @@ from airtouch.simulation.effects import EFFECTS, NAMES
 from airtouch.vehicle import Vehicle
 
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
-#: effects of which the first with a probability below WRONG_BELOW is the wrong one of the control; chosen, those that a
-#: hover shows (`signature.WRONG` has others)
-WRONG_IN_HOVER, WRONG_BELOW = ("com_offset", "slung_load", "mass", "weak_motor"), 0.1
-NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
-LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
+#: the first of these that is improbable is the wrong effect of the control; chosen, those that a hover shows
+#: (`signature.WRONG` has others)
+WRONG_IN_HOVER = ("com_offset", "slung_load", "mass", "weak_motor")
+WRONG_BELOW = 0.1  #: probability below which an effect is surely wrong; chosen
 NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; the only "
            "effects tried are {}")
 UNSTEADINESS = ", and how unsteady it is"  #: in NO_GYRO, where that is judged
@@ -125,36 +124,6 @@ def _closure(gap: np.ndarray, base: Reference, fit: Likeliest) -> Closure:
     return Closure(before, after, Quantity(closed(after), min(low, closed(after)), max(high, closed(after))))
 
 
-def closes_too_little(closure: Closure) -> bool:
-    """Whether an effect closes less than LEAST_CLOSED of a gap over STANDS_OUT, too little to be its cause.
-
-    Of a smaller gap it need close nothing, but must not make it larger. The tails of the likelihood forgive one number
-    of the balance that is far off, however far: an effect may be much more probable than the others, and leave the gap
-    as it is.
-    """
-    if closure.before <= STANDS_OUT:
-        return closure.after > closure.before
-    return closure.shrink.value < LEAST_CLOSED
-
-
-def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-                         ) -> tuple[dict[str, float], list[str]]:
-    """The probabilities with those of names that close too little at 0, and these names, the likeliest first.
-
-    A weight is withdrawn in both forms. If an effect that closes enough is then the likeliest, the others add up to 1;
-    if one of NO_EFFECTS is, `unknown` takes the probability of these names.
-    """
-    probability, withdrawn, withdrawn_probability = dict(probability_of), [], 0.0
-    while (first := answer_of(probability)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
-        withdrawn.append(first)
-        withdrawn_probability += _weights_together(first, probability)[first]
-        probability.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in probability})
-    if first in NO_EFFECTS:
-        return {**probability, "unknown": probability["unknown"] + withdrawn_probability}, withdrawn
-    total = sum(probability.values()) if withdrawn else 1.0
-    return {n: p / total for n, p in probability.items()}, withdrawn
-
-
 def _gap(verdict: str, closure: Closure) -> OverallGap:
     """The gap before and after in standard deviations of the floor; unchanged where no effect is named."""
     return {"before": closure.before, "floor": 1.0, "after": closure.after if verdict == "effect" else closure.before}
@@ -169,45 +138,6 @@ def control_of(probability_of: Mapping[str, float], named: Collection[str], clos
     right = {*named, *(OTHER_WEIGHT[n] for n in named if n in OTHER_WEIGHT)}
     wrong = next((n for n in WRONG_IN_HOVER if n not in right and probability_of.get(n, 1.0) < WRONG_BELOW), None)
     return None if wrong is None else Control(wrong, closures[wrong])
-
-
-def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-               withdrawn: Sequence[str] = ()) -> list[RankedCandidate]:
-    """Every candidate, best first. A weight's two forms count as one where one of them is the answer.
-
-    No effect and a nameless change are no effects to switch on: how far they close the gap is not measured. Names that
-    were withdrawn follow the answer.
-    """
-    together = _weights_together(first, probability_of)
-    best = max(together.values())
-
-    def reason(name: str, probability: float) -> str:
-        """Why a candidate is not the answer; empty for the answer."""
-        if name == first:
-            return ""
-        if name in withdrawn:
-            return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
-        if probability == 0.0 and (other := OTHER_WEIGHT.get(name)) in (first, *withdrawn):
-            return f"counted with {other}: a weight, whether its own mass shows or not"
-        return f"{best / max(probability, LEAST_PROBABILITY):.3g} times less probable than {first}"
-
-    def candidate(name: str, probability: float) -> RankedCandidate:
-        """A candidate's row."""
-        is_effect = name not in NO_EFFECTS
-        return RankedCandidate(name, probability, closures[name].shrink if is_effect else Quantity(0.0),
-                               reason(name, probability), measured=is_effect)
-
-    order = [first, *withdrawn]
-    return sorted((candidate(n, p) for n, p in together.items()),
-                  key=lambda r: (order.index(r.name) if r.name in order else len(order), -r.probability))
-
-
-def _weights_together(first: str, probability_of: Mapping[str, float]) -> dict[str, float]:
-    """The probabilities, those of a weight's two forms summed in the one that is the answer, if it is."""
-    other = OTHER_WEIGHT.get(first)
-    if other is None or other not in probability_of:
-        return dict(probability_of)
-    return {**probability_of, first: probability_of[first] + probability_of[other], other: 0.0}
 
 
 def _cells(gap: np.ndarray, base: Reference, vehicle: Vehicle, fit: Likeliest | None, flights: int,

@@ -43,7 +43,7 @@ class Reference:
 
         POWER is NaN where the flight, or a nominal one, has no velocity.
         """
-        return _over_caused([pattern], self.own_power)[0] - self.mean
+        return _over_expected([pattern], self.own_power)[0] - self.mean
 
     def mean_difference(self, patterns: Sequence[HoverPattern]) -> np.ndarray:
         """Mean `difference` (6,) of the patterns of flights that have a hover; at least one has.
@@ -61,9 +61,9 @@ def reference(patterns: Sequence[HoverPattern], priors: Priors = PRIORS) -> Refe
     further flight differs from the mean of n by 1 + 1 / n of it.
     """
     known = [p for p in patterns if p.known]
-    power, caused = np.array([p.power for p in known]), _caused(known)
+    power, caused = np.array([p.power for p in known]), _power_by_corrections(known)
     own_power = np.array([_own_power(*of) for of in zip(power.T, caused.T, strict=True)])
-    table = _over_caused(known, own_power)
+    table = _over_expected(known, own_power)
     n, prior_n = len(table), priors.nominal_flights
     squares = ((table - table.mean(axis=0)) ** 2).sum(axis=0)
     variance = (squares + prior_n * np.array(priors.nominal) ** 2) / (n - 1.0 + prior_n)
@@ -120,15 +120,15 @@ def _with_power(log: float, h: Hypothesis, difference: np.ndarray, variance: np.
     return log
 
 
-def _caused(patterns: Sequence[HoverPattern]) -> np.ndarray:
+def _power_by_corrections(patterns: Sequence[HoverPattern]) -> np.ndarray:
     """Power (flights, 2) of unsteadiness and heave that the corrections cause."""
     return ANSWER * 10.0 ** np.array([p.corrections for p in patterns])
 
 
-def _over_caused(patterns: Sequence[HoverPattern], own_power: np.ndarray) -> np.ndarray:
+def _over_expected(patterns: Sequence[HoverPattern], own_power: np.ndarray) -> np.ndarray:
     """BALANCE and POWER (flights, 6), log10 of the powers over those that are expected with the corrections."""
     balance, power = np.array([p.balance for p in patterns]), np.array([p.power for p in patterns])
-    return np.column_stack([balance, power - np.log10(10.0 ** own_power + _caused(patterns))])
+    return np.column_stack([balance, power - np.log10(10.0 ** own_power + _power_by_corrections(patterns))])
 
 
 def _own_power(power: np.ndarray, caused: np.ndarray) -> float:

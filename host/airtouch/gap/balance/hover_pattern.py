@@ -109,17 +109,17 @@ def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
     logged = np.ones(len(flight), bool)
     for a, b in runs(flight.not_logged):
         logged[a:b] = b - a <= MOST_BRIDGED
-    parts = [(a + first, a + last) for a, b in _with_holes(flight) for first, last in runs(logged[a:b])]
+    parts = [(a + first, a + last) for a, b in _stretches_with_holes(flight) for first, last in runs(logged[a:b])]
     return parts if sum(b - a for a, b in parts) * PERIOD_S >= LEAST_S else []
 
 
 def share_not_logged(flight: Flight) -> float:
     """Share of the samples of a flight's hovers, holes included, that were not logged; 0 without a hover."""
-    stretches = [flight.not_logged[a:b] for a, b in _with_holes(flight)]
+    stretches = [flight.not_logged[a:b] for a, b in _stretches_with_holes(flight)]
     return float(np.concatenate(stretches).mean()) if stretches else 0.0
 
 
-def _with_holes(flight: Flight) -> list[tuple[int, int]]:
+def _stretches_with_holes(flight: Flight) -> list[tuple[int, int]]:
     """First sample, and the one after the last, of each stretch in the air but SETTLE_S at either end."""
     air = (flight.phase != GROUND) & ~flight.on_ground
     trim = int(SETTLE_S / PERIOD_S)
@@ -150,9 +150,9 @@ def _log_powers(mixed: np.ndarray, upwards: np.ndarray) -> tuple[float, float]:
     """Unsteadiness and heave of a hover of LEAST_SPECTRUM samples or more; mixed, upwards: as for `_stretch`."""
     from scipy.signal import welch  # slow to import, and seldom needed
 
-    block = {"fs": 1.0 / PERIOD_S, "nperseg": min(len(mixed), SPECTRUM_SAMPLES), "nfft": SPECTRUM_SAMPLES}
-    f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), **block, axis=0)
-    f, of_heave = welch(upwards, **block)
+    settings = {"fs": 1.0 / PERIOD_S, "nperseg": min(len(mixed), SPECTRUM_SAMPLES), "nfft": SPECTRUM_SAMPLES}
+    f, of_commands = welch(mixed[:, 1:] / mixed[:, :1].mean(), **settings, axis=0)
+    f, of_heave = welch(upwards, **settings)
     heave = float(np.log10(of_heave[(f >= HEAVE_HZ[0]) & (f < HEAVE_HZ[1])].mean()))
     return _unsteadiness(f, of_commands), heave
 
