@@ -3,14 +3,16 @@
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from airtouch import kernels, vehicle
+from airtouch import kernels, logs, vehicle
 from airtouch.detector import best
-from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM
+from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 
@@ -89,6 +91,39 @@ def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
 def test_the_program_on_the_page_is_the_one_that_is_built_here():
     (program,) = re.findall(r"```cpp\n(.+?)```", PAGE, re.S)
     assert program == (ROOT / "tests/firmware/kernels/port/example.cpp").read_text()
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A flight as a log of body axes alone, as a recorded one may be, and its path."""
+    log = fly(scenario.load("paper-4cm"), vehicle.load(), seed=3)
+    log = FlightLog({n: v for n, v in log.columns.items() if n not in ACC_WORLD}, log.meta)
+    path = tmp_path_factory.mktemp("one") / "recorded.csv.gz"
+    logs.write(log, path)
+    return log, path
+
+
+def test_the_rows_of_the_page_are_level_and_its_python_prints_their_edges(recorded, tmp_path, capsys, monkeypatch):
+    """Level axes as a rotation library has them; the edges as the C detector finds them in these rows."""
+    rows_py, edges_py = re.findall(r"```python\n(.+?)```", PAGE, re.S)
+    log, path = recorded
+    process = subprocess.run([sys.executable, "-c", rows_py, path], capture_output=True)
+    assert process.returncode == 0, process.stderr.decode()[-3000:]
+    rows = np.frombuffer(process.stdout, np.float32).reshape(-1, 10)
+    level = Rotation.from_euler("xy", log.stack(("roll_rad", "pitch_rad"))).apply(log.stack(ACC))
+    np.testing.assert_allclose(rows[:, :3], level, atol=1e-5)
+    np.testing.assert_allclose(rows[:, 3:], np.column_stack([log.stack(GYRO), log.stack(PWM)]), rtol=1e-6)
+    model = best.load(None)
+    edge = kernels.stream_detector(rows[:, :3], rows[:, 3:6], rows[:, 6:], model.int8, model.recipe.motion,
+                                   model.decoder_without(())).edge
+    expected = [f"{i / 100} s {'entry' if edge[i] == 1 else 'exit'}" for i in np.flatnonzero(edge)]
+    (tmp_path / "one").mkdir()
+    shutil.copy(path, tmp_path / "one")
+    monkeypatch.chdir(tmp_path)
+    exec(edges_py, {})
+    assert capsys.readouterr().out.splitlines() == expected
+    (printed,) = re.findall(r"```\n([\d.]+ s entry\n.+?)```", PAGE, re.S)
+    assert printed.splitlines() == expected
 
 
 @pytest.mark.parametrize("header", PUBLIC, ids=lambda path: path.name)
