@@ -62,6 +62,24 @@ def test_a_list_builds_alone_for_a_cortex_m0(title, tmp_path):
     assert variables == [], "no globals that are written"
 
 
+def test_the_sizes_on_the_page_are_those_of_the_sources(tmp_path):
+    """Each size and the total within 3 %, as another release of the compiler may give a few bytes more or less."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
+    block, objects = PAGE.split("## ")[0], []
+    flags = re.findall(r'^M0="(.+)"$', block, re.M)[0].split()
+    for source in " ".join(re.findall(r'^BEST="(?:\$BEST )?(.+)"$', block, re.M)).split():
+        objects.append(tmp_path / f"{Path(source).stem}.o")
+        run("arm-none-eabi-gcc", *(word.replace("-I", f"-I{ROOT}/") for word in flags), "-c", ROOT / source,
+            "-o", objects[-1])
+    measured = {Path(row.split()[-1]).name: int(row.split()[3])
+                for row in run("arm-none-eabi-size", "-t", *objects).splitlines()[1:]}
+    printed = {row[-1]: int(row[3]) for row in map(str.split, block.splitlines()) if len(row) == 6 and row[3].isdigit()}
+    assert len(printed) == 4
+    for name, size in printed.items():
+        assert measured[name] == pytest.approx(size, rel=0.03), name
+
+
 def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
     cc, cpp = shutil.which("cc"), shutil.which("c++")
     if cc is None or cpp is None:
