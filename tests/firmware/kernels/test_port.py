@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import airtouch as at
 from airtouch import kernels, logs, vehicle
 from airtouch.detector import best
 from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
@@ -104,6 +105,32 @@ def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
     edges = np.array([int(row[4]) for row in rows])
     np.testing.assert_array_equal(edges, expected.edge)
     assert edges.any()
+
+
+def test_the_papers_program_has_the_features_probability_and_edges_of_the_detector(recorded, tmp_path):
+    """Its edges come one sample later: a probability counts from the sample on that follows its window."""
+    cc = shutil.which("cc")
+    if cc is None:
+        pytest.skip("no C compiler on this machine")
+    program = ROOT / "tests/firmware/kernels/port/paper.c"
+    (excerpt,) = re.findall(r"```c\n(.+?)```", PAGE, re.S)
+    lines = {line.strip() for line in program.read_text().splitlines()}
+    assert {line.strip() for line in excerpt.splitlines()} <= lines
+    _, pipeline, network, _ = LISTS.values()
+    sources = [*pipeline, *network, "gap8/model/airtouch_model.c", "gap8/model/airtouch_stream.c", program]
+    built = tmp_path / "paper"
+    run(cc, "-O2", *FLAGS, *(ROOT / source for source in sources), "-lm", "-o", built)
+    names = (*ACC, *GYRO, *PWM, "zrange_m")  # no attitude: body axes count as level in both
+    log = FlightLog({name: recorded[0][name] for name in names}, recorded[0].meta)
+    table = log.stack(names[:10]).astype(np.float32)
+    output = subprocess.run([built], input=table.tobytes(), capture_output=True, check=True).stdout.decode()
+    rows = np.array([line.split() for line in output.splitlines()], float)
+    expected = at.detect(log, "paper")
+    np.testing.assert_allclose(rows[:, 1:4], expected.signals["fused"], rtol=1e-5)
+    np.testing.assert_allclose(rows[:, 4], expected.probability, atol=1e-5)
+    kinds = {"entry": 1, "exit": 2}
+    assert [(i, rows[i, 5]) for i in np.flatnonzero(rows[:, 5])] == [
+        (edge.sample + 1, kinds[edge.kind]) for edge in expected.edges] != []
 
 
 def test_the_program_on_the_page_is_the_one_that_is_built_here():
