@@ -75,7 +75,8 @@ def test_the_sizes_on_the_page_are_those_of_the_sources(tmp_path):
             "-o", objects[-1])
     measured = {Path(row.split()[-1]).name: int(row.split()[3])
                 for row in run("arm-none-eabi-size", "-t", *objects).splitlines()[1:]}
-    printed = {row[-1]: int(row[3]) for row in map(str.split, block.splitlines()) if len(row) == 6 and row[3].isdigit()}
+    printed = {Path(row[-1]).name: int(row[3]) for row in map(str.split, block.splitlines())
+               if len(row) == 6 and row[3].isdigit()}
     assert len(printed) == 4
     for name, size in printed.items():
         assert measured[name] == pytest.approx(size, rel=0.03), name
