@@ -3,14 +3,17 @@
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from airtouch import kernels, vehicle
+import airtouch as at
+from airtouch import kernels, logs, vehicle
 from airtouch.detector import best
-from airtouch.logs.flight_log import ACC_WORLD, GYRO, PWM
+from airtouch.logs.flight_log import ACC, ACC_WORLD, GYRO, PWM, FlightLog
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import fly
 
@@ -60,6 +63,25 @@ def test_a_list_builds_alone_for_a_cortex_m0(title, tmp_path):
     assert variables == [], "no globals that are written"
 
 
+def test_the_sizes_on_the_page_are_those_of_the_sources(tmp_path):
+    """Each size and the total within 3 %, as another release of the compiler may give a few bytes more or less."""
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("no arm-none-eabi-gcc: apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi")
+    block, objects = PAGE.split("## ")[0], []
+    flags = re.findall(r'^M0="(.+)"$', block, re.M)[0].split()
+    for source in " ".join(re.findall(r'^BEST="(?:\$BEST )?(.+)"$', block, re.M)).split():
+        objects.append(tmp_path / f"{Path(source).stem}.o")
+        run("arm-none-eabi-gcc", *(word.replace("-I", f"-I{ROOT}/") for word in flags), "-c", ROOT / source,
+            "-o", objects[-1])
+    measured = {Path(row.split()[-1]).name: int(row.split()[3])
+                for row in run("arm-none-eabi-size", "-t", *objects).splitlines()[1:]}
+    printed = {Path(row[-1]).name: int(row[3]) for row in map(str.split, block.splitlines())
+               if len(row) == 6 and row[3].isdigit()}
+    assert len(printed) == 4
+    for name, size in printed.items():
+        assert measured[name] == pytest.approx(size, rel=0.03), name
+
+
 def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
     cc, cpp = shutil.which("cc"), shutil.which("c++")
     if cc is None or cpp is None:
@@ -86,9 +108,68 @@ def test_the_program_in_cpp_gives_the_detectors_bits(tmp_path):
     assert edges.any()
 
 
+def test_the_papers_program_has_the_features_probability_and_edges_of_the_detector(recorded, tmp_path):
+    """Its edges come one sample later: a probability counts from the sample on that follows its window."""
+    cc = shutil.which("cc")
+    if cc is None:
+        pytest.skip("no C compiler on this machine")
+    program = ROOT / "tests/firmware/kernels/port/paper.c"
+    (excerpt,) = re.findall(r"```c\n(.+?)```", PAGE, re.S)
+    lines = {line.strip() for line in program.read_text().splitlines()}
+    assert {line.strip() for line in excerpt.splitlines()} <= lines
+    _, pipeline, network, _ = LISTS.values()
+    sources = [*pipeline, *network, "gap8/model/airtouch_model.c", "gap8/model/airtouch_stream.c", program]
+    built = tmp_path / "paper"
+    run(cc, "-O2", *FLAGS, *(ROOT / source for source in sources), "-lm", "-o", built)
+    names = (*ACC, *GYRO, *PWM, "zrange_m")  # no attitude: body axes count as level in both
+    log = FlightLog({name: recorded[0][name] for name in names}, recorded[0].meta)
+    table = log.stack(names[:10]).astype(np.float32)
+    output = subprocess.run([built], input=table.tobytes(), capture_output=True, check=True).stdout.decode()
+    rows = np.array([line.split() for line in output.splitlines()], float)
+    expected = at.detect(log, "paper")
+    np.testing.assert_allclose(rows[:, 1:4], expected.signals["fused"], rtol=1e-5)
+    np.testing.assert_allclose(rows[:, 4], expected.probability, atol=1e-5)
+    kinds = {"entry": 1, "exit": 2}
+    assert [(i, rows[i, 5]) for i in np.flatnonzero(rows[:, 5])] == [
+        (edge.sample + 1, kinds[edge.kind]) for edge in expected.edges] != []
+
+
 def test_the_program_on_the_page_is_the_one_that_is_built_here():
     (program,) = re.findall(r"```cpp\n(.+?)```", PAGE, re.S)
     assert program == (ROOT / "tests/firmware/kernels/port/example.cpp").read_text()
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A flight as a log of body axes alone, as a recorded one may be, and its path."""
+    log = fly(scenario.load("paper-4cm"), vehicle.load(), seed=3)
+    log = FlightLog({n: v for n, v in log.columns.items() if n not in ACC_WORLD}, log.meta)
+    path = tmp_path_factory.mktemp("one") / "recorded.csv.gz"
+    logs.write(log, path)
+    return log, path
+
+
+def test_the_rows_of_the_page_are_level_and_its_python_prints_their_edges(recorded, tmp_path, capsys, monkeypatch):
+    """Level axes as a rotation library has them; the edges as the C detector finds them in these rows."""
+    rows_py, edges_py = re.findall(r"```python\n(.+?)```", PAGE, re.S)
+    log, path = recorded
+    process = subprocess.run([sys.executable, "-c", rows_py, path], capture_output=True)
+    assert process.returncode == 0, process.stderr.decode()[-3000:]
+    rows = np.frombuffer(process.stdout, np.float32).reshape(-1, 10)
+    level = Rotation.from_euler("xy", log.stack(("roll_rad", "pitch_rad"))).apply(log.stack(ACC))
+    np.testing.assert_allclose(rows[:, :3], level, atol=1e-5)
+    np.testing.assert_allclose(rows[:, 3:], np.column_stack([log.stack(GYRO), log.stack(PWM)]), rtol=1e-6)
+    model = best.load(None)
+    edge = kernels.stream_detector(rows[:, :3], rows[:, 3:6], rows[:, 6:], model.int8, model.recipe.motion,
+                                   model.decoder_without(())).edge
+    expected = [f"{i / 100} s {'entry' if edge[i] == 1 else 'exit'}" for i in np.flatnonzero(edge)]
+    (tmp_path / "one").mkdir()
+    shutil.copy(path, tmp_path / "one")
+    monkeypatch.chdir(tmp_path)
+    exec(edges_py, {})
+    assert capsys.readouterr().out.splitlines() == expected
+    (printed,) = re.findall(r"```\n([\d.]+ s entry\n.+?)```", PAGE, re.S)
+    assert printed.splitlines() == expected
 
 
 @pytest.mark.parametrize("header", PUBLIC, ids=lambda path: path.name)

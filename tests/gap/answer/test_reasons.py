@@ -12,6 +12,7 @@ from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import (
     Hypothesis,
     NamelessGain,
+    OutgainedPassing,
     OverPrediction,
     Selection,
     Step,
@@ -117,6 +118,15 @@ def test_reasons_where_nothing_is_named():
     assert why_not(related, "wind", "unknown") == ("the relations of the signals gain 40.0 nats by it, and more by a "
                                                    "model without names")
     assert why_not(related, "unknown", "none") == "the gap as a whole is at its floor"
+
+
+def test_reason_of_a_passing_effect_that_a_steady_one_outgains():
+    """It is that of the effect in its seconds, not of the same effect all along, which nominal flights have as well."""
+    passing = replace(selection(), outgained={"wind": OutgainedPassing(205.0, "mass", 200.0)})
+    assert why_not(passing, "wind", "effect") == ("in some seconds alone it gains 205 nats, but mass all along 200, "
+                                                  "and 12 more than that are needed")
+    assert why_not(replace(passing, outgained={"gust": OutgainedPassing(205.0, "mass", 200.0)}), "gust",
+                   "effect") == "gains 20 nats, while mass gains 200"  # all along it has evidence
 
 
 def test_reason_where_the_flight_is_less_steady_than_nominal_ones():

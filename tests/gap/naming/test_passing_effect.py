@@ -51,9 +51,13 @@ def test_passing_effect_must_gain_more_than_a_steady_one(names, nominal_sizes, m
     A mass that nominal flights have as well does not count; what follows the flight's own height does.
     """
     pushed = with_a_push(0.0 if mps2 == 0.5 else 2.0, 25.0, mps2=mps2)
-    selection, _ = select_from([pushed], names, scattered(**nominal_sizes), ())
+    selection, data = select_from([pushed], names, scattered(**nominal_sizes), ())
     assert [s.name for s in selection.named_steps] == named
     assert ("downwash" in selection.single_effects) == ("downwash" in named)
+    outgained = {name: (passing.steady_name, passing.steady_gain) for name, passing in selection.outgained.items()}
+    assert outgained.get("downwash") == (("mass", selection.single_effects["mass"].gain) if named == ["mass"] else None)
+    for name, passing in selection.outgained.items():
+        assert passing.gain == passing_effects(data)[name].gain < passing.steady_gain + policy.LEAST_GAIN
 
 
 @pytest.mark.parametrize(("less", "named"), [(policy.LEAST_GAIN - 1.0, []), (policy.LEAST_GAIN + 1.0, ["downwash"])])

@@ -2,6 +2,7 @@
 
 from airtouch.gap.answer.words import joined
 from airtouch.gap.evidence.cells import REST_VIEW, place_of
+from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.records import Hypothesis, Selection, Step
 from airtouch.gap.naming.unknown import (
     counterevidence,
@@ -56,6 +57,10 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     least = selection.least_nats[hypothesis.name]
     if hypothesis.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)
+    if hypothesis.evidence < least and hypothesis.name in selection.outgained:
+        passing = selection.outgained[hypothesis.name]
+        return (f"in some seconds alone it gains {passing.gain:.0f} nats, but {passing.steady_name} all along "
+                f"{passing.steady_gain:.0f}, and {PASSING_GAIN:.0f} more than that are needed")
     if hypothesis.gain < least:
         return f"held-out data gain {hypothesis.gain:.1f} nats by it, but {least:.0f} are needed"
     if hypothesis.evidence < least:

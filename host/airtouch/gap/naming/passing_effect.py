@@ -9,7 +9,7 @@ from airtouch.gap.nameless.model import height_gain
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.judging import Trial, gain_of
 from airtouch.gap.naming.policy import PASSING_GAIN
-from airtouch.gap.naming.records import Charges, Hypothesis, Step, Strength, UnsteadinessRarity
+from airtouch.gap.naming.records import Charges, Hypothesis, OutgainedPassing, Step, Strength, UnsteadinessRarity
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
 from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, log_entropies
@@ -17,27 +17,51 @@ from airtouch.gap.signatures.scatter import Scatter, size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 
-def passing_effect(search: Search, without: Sequence[str]) -> Hypothesis | None:
-    """The passing effect that explains most, as a hypothesis; None where none meets the conditions below.
+def unusual_passing_effects(search: Search, without: Sequence[str]) -> list[PassingEffect]:
+    """Passing effects that gain PASSING_GAIN more than what follows the flight's own height and have it as evidence.
 
-    It must gain PASSING_GAIN more than every effect that always acts and has enough evidence, PASSING_GAIN more than
-    what follows the flight's own height, which needs no other vehicle, and have PASSING_GAIN as evidence
-    (`passing_evidence`). Seconds in which another vehicle is known to be overhead go before others, which are only
-    likely. without: names that are left out.
+    What follows the height needs no other vehicle. Evidence: `passing_evidence`. without: names that are left out.
     """
     trial, data = search.trial, search.trial.data
     if data.study.scatter is None:
-        return None
+        return []
     least = height_gain(data, trial.halves) + PASSING_GAIN
-    effects = [e for e in passing_effects(data, without).values()
-               if e.gain >= least and passing_evidence(data, e.key, e.gain, e.strength) >= PASSING_GAIN]
-    if effects:  # else what always acts need not be judged
-        steady_gains = [h.gain for name, h in search.single_effects.items() if h.evidence >= search.least_nats[name]]
-        effects = [e for e in effects if e.gain >= max(steady_gains, default=0.0) + PASSING_GAIN]
+    return [e for e in passing_effects(data, without).values()
+            if e.gain >= least and passing_evidence(data, e.key, e.gain, e.strength) >= PASSING_GAIN]
+
+
+def passing_effect(search: Search, unusual: Sequence[PassingEffect]) -> Hypothesis | None:
+    """The passing effect that explains most, as a hypothesis; None where none gains enough.
+
+    It must gain PASSING_GAIN more than every effect that always acts and has enough evidence. Seconds in which another
+    vehicle is known to be overhead go before others, which are only likely. unusual: `unusual_passing_effects`.
+    """
+    if not unusual:  # what always acts need not be judged
+        return None
+    steady = _best_steady(search)
+    effects = [e for e in unusual if e.gain >= (steady.gain if steady else 0.0) + PASSING_GAIN]
     if not effects:
         return None
     overhead = [e for e in effects if e.key == KNOWN_OVERHEAD]
-    return _hypothesis_of(trial, max(overhead or effects, key=lambda e: e.gain))
+    return _hypothesis_of(search.trial, max(overhead or effects, key=lambda e: e.gain))
+
+
+def outgained(search: Search, unusual: Sequence[PassingEffect]) -> dict[str, OutgainedPassing]:
+    """Passing effects, by name, that gain less than PASSING_GAIN more than an effect that always acts.
+
+    unusual: `unusual_passing_effects`.
+    """
+    steady = _best_steady(search) if unusual else None
+    if steady is None:
+        return {}
+    return {e.name: OutgainedPassing(e.gain, steady.name, steady.gain)
+            for e in sorted(unusual, key=lambda e: e.gain) if e.gain < steady.gain + PASSING_GAIN}
+
+
+def _best_steady(search: Search) -> Hypothesis | None:
+    """The effect that gains most of those that always act and have enough evidence; None where there is none."""
+    sufficient = [h for name, h in search.single_effects.items() if h.evidence >= search.least_nats[name]]
+    return max(sufficient, key=lambda h: h.gain, default=None)
 
 
 def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Hypothesis:

@@ -138,6 +138,17 @@ class UnsteadinessRarity(NamedTuple):
     rarest: str = ""
 
 
+class OutgainedPassing(NamedTuple):
+    """A passing effect that gains no more nats than it needs beside the effect that always acts and gains most.
+
+    gain: of the passing effect; steady_name, steady_gain: of that other one.
+    """
+
+    gain: float
+    steady_name: str
+    steady_gain: float
+
+
 class WithdrawnNames(NamedTuple):
     """Effects whose names were withdrawn, as their shrink of recorded flights' gap, together, is too small."""
 
@@ -155,7 +166,8 @@ class Selection:
     than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
     as the effect is random or changes the loop of recorded flights; over_prediction: that of the effects named;
     inference: what named the effects, where the relations of signals did; withdrawn: names that were withdrawn;
-    unsteadiness_rarity: how much less steady the flights are than nominal ones.
+    unsteadiness_rarity: how much less steady the flights are than nominal ones; outgained: passing effects, by name,
+    that would be named but for one that always acts.
     """
 
     single_effects: Mapping[str, Hypothesis]
@@ -169,6 +181,7 @@ class Selection:
     inference: Inference | None = None
     withdrawn: WithdrawnNames = WithdrawnNames()
     unsteadiness_rarity: UnsteadinessRarity = UnsteadinessRarity()
+    outgained: Mapping[str, OutgainedPassing] = field(default_factory=dict)
 
     @property
     def last_step(self) -> Step | None:

@@ -18,11 +18,18 @@ from airtouch.gap.naming.forward import PartialSelection, Search, forward
 from airtouch.gap.naming.judging import Trial, trial_of
 from airtouch.gap.naming.leave_one_out import with_leave_one_out_gains
 from airtouch.gap.naming.over_prediction import over_prediction_of
-from airtouch.gap.naming.passing_effect import as_in_nominal_flights, passing_effect, unsteadiness_rarity
+from airtouch.gap.naming.passing_effect import (
+    as_in_nominal_flights,
+    outgained,
+    passing_effect,
+    unsteadiness_rarity,
+    unusual_passing_effects,
+)
 from airtouch.gap.naming.policy import WAKE_SHARE
 from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection
 from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.naming.unknown import is_explained
+from airtouch.gap.passing.gates import PassingEffect
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -51,8 +58,8 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
     inference = inference_of(data, list(candidates))
     if inference is not None and PACKAGE_EFFECTS.issuperset(candidates):
         return _by_relations(search, inference, without, rank_all)
-    passing = passing_effect(search, without)
-    answer = _by_replay(search, _search_effects(search, passing))
+    unusual = unusual_passing_effects(search, without)
+    answer = _by_replay(search, _search_effects(search, passing_effect(search, unusual)), unusual)
     if inference is None or _own_effect_explains(answer):
         return answer
     return _by_relations(search, inference, without, rank_all)
@@ -73,13 +80,14 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     answer = selection_by_relations(search, inference, rank_all)
     if is_explained(answer):
         return answer
-    passing = passing_effect(search, without)
+    unusual = unusual_passing_effects(search, without)
+    passing = passing_effect(search, unusual)
     if not replay_may_name(passing, inference):
         return answer
     partial = _search_effects(search, passing)
     if next(iter(partial.names), "") not in (OVERHEAD, inference.likeliest):
         return answer
-    return _by_replay(search, partial)
+    return _by_replay(search, partial, unusual)
 
 
 def replay_may_name(passing: Hypothesis | None, inference: Inference) -> bool:
@@ -111,8 +119,8 @@ def _search_effects(search: Search, passing: Hypothesis | None) -> PartialSelect
     return replace(partial, steps=tuple(steps))
 
 
-def _by_replay(search: Search, partial: PartialSelection) -> Selection:
-    """The selection that a search ended in, with what it leaves."""
+def _by_replay(search: Search, partial: PartialSelection, unusual: Sequence[PassingEffect]) -> Selection:
+    """The selection that a search ended in, with what it leaves. unusual: `unusual_passing_effects`."""
     trial, policy, steps = search.trial, search.trial.policy, partial.steps
     last = steps[-1].terms if steps else ()
     over_none = nameless_nats(trial, None)
@@ -121,7 +129,7 @@ def _by_replay(search: Search, partial: PartialSelection) -> Selection:
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, unexplained_clock_gain(trial.data, last)),
         spectrum_is_assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)),
-        policy=policy)
+        policy=policy, outgained=outgained(search, unusual))
     if policy.judges_unsteadiness:
         selection = replace(selection, unsteadiness_rarity=unsteadiness_rarity(trial.data))
     if policy.judges_over_prediction:

@@ -139,7 +139,7 @@ def _sides(rows: dict) -> tuple[bool | None, str]:
 
 
 def wind(job: Job) -> Figure:
-    """Section 7.6: simulated flights 4 cm over a platform in steady wind from the front and from the left.
+    """Section 7.7: simulated flights 4 cm over a platform in steady wind from the front and from the left.
 
     Not tested where the paper's method misses over half of the edges in calm, unless `best` is worse in some wind.
     """
