@@ -37,7 +37,7 @@ def lines(ax):
 def signal(measured=True, after=True, phase=None):
     steps = np.zeros(100, int) if phase is None else phase
     return Signal("a.csv", "force_x", 2.0, "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
-                  np.full(100, 2.0), np.full(100, 0.5) if after else None, 0.25)
+                  np.full(100, 2.0), np.full(100, 0.5) if after else None, np.full(100, 0.25))
 
 
 def test_signal_has_measured_and_models_above_and_their_differences_below(drawn):
@@ -46,6 +46,16 @@ def test_signal_has_measured_and_models_above_and_their_differences_below(drawn)
     assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
     assert "floor" in below.get_legend_handles_labels()[1]
     assert above.get_ylabel() == "forward force\nm/s²" and below.get_xlabel() == "time, s"
+
+
+def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown(drawn):
+    floor = np.repeat([0.25, 1.0, np.nan], [50, 25, 25])
+    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=floor)).axes
+    (grey,) = ax.collections
+    for inside, point in ((True, (4.0, 0.2)), (False, (4.0, 0.5)), (True, (6.0, -0.9)), (False, (8.0, 0.0))):
+        assert any(path.contains_point(point) for path in grey.get_paths()) is inside, point
+    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=np.full(100, np.nan))).axes
+    assert not ax.collections and "floor" not in ax.get_legend_handles_labels()[1]
 
 
 def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):

@@ -177,7 +177,8 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
-        pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
+        pictures=pictures_of(study, usable, nominal, terms, cells if headline else (), whole_map.cells)
+        if pictures else None)
     return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 

@@ -43,7 +43,9 @@ def signals(signal: Signal) -> bytes:
             axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{_unit(signal.unit)}")
             limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
         gap = axes[0 if signal.measured is None else 1]
-        gap.axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
+        if np.isfinite(signal.floor).any():
+            gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", color=FLOOR, alpha=0.4, lw=0,
+                             label="floor")
         gap.plot(signal.time_s, signal.before, label="gap before", **BEHIND)
         if signal.after is not None:
             gap.plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
@@ -52,7 +54,7 @@ def signals(signal: Signal) -> bytes:
             axes[-1].plot(signal.time_s, signal.height_m, color=BLUE, lw=1.0, label="height over the ground below")
             axes[-1].set_ylabel("height\nm")
         axes[-1].set_xlabel("time, s")
-        limit(gap, signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
+        limit(gap, signal.before, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)

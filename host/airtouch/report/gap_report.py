@@ -13,6 +13,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from airtouch import __version__
 from airtouch.extras import lacking
 from airtouch.gap.answer import words
@@ -32,6 +34,8 @@ from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
+#: what is grey in the plot of a signal
+FLOOR_DRAWN = "Grey: the floor up to this frequency (rms) in each phase. "
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -132,9 +136,11 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
+        floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
         plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.highest_hz:g} Hz",
-                          f"Flight {Path(signal.flight).name}. Grey: the floor; blue: take-off and landing; yellow: "
-                          "over a platform.", partial(gap_figures.signals, signal)))
+                          f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
+                          "over a platform.",
+                          partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = "Mean over the flights."
         if any(s.after is not None for s in pictures.spectra):

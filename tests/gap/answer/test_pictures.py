@@ -12,6 +12,8 @@ from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signals.channels import COLUMN, angular_acceleration
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.signatures.candidates import term_of, terms
+from airtouch.gap.where.gap_map import gap_map
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
 from hovers import FLOOR, LOUDNESS, hover
@@ -27,16 +29,36 @@ def bias(mps2):
     return term_of(NamedEffect("imu_bias", {"acc_x": Quantity(mps2)}))
 
 
-def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR):
-    return pictures_of(study, flights, nominal, effects, cells)
+def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR, whole_map=()):
+    return pictures_of(study, flights, nominal, effects, cells, whole_map)
 
 
 def test_signal_is_that_of_the_cell():
     drawn = pictures(flight(SECONDS, FORWARD, name="pushed.csv")).signal
     assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
-    assert drawn.floor == LOWEST.floor
     np.testing.assert_allclose(drawn.time_s, TIME_S)
     assert drawn.phase.shape == TIME_S.shape and drawn.after is None
+
+
+def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phase_by_phase():
+    """3, 4 and 5; that of another channel, of a higher band and of a regime does not count, nor does half a floor."""
+    low, second, third = (0.0, 0.5), (0.5, 2.0), (2.0, 6.0)
+    floors = [("hover", low, 0.3), ("hover", second, 0.4), ("hover", third, 7.0), ("take-off", low, 0.6),
+              ("take-off", second, 0.8), ("landing", low, 0.1)]
+    whole_map = [*(cell("force_x", phase, 0.5, floor, band_hz=band) for phase, band, floor in floors),
+                 cell("force_y", "hover", 0.5, 9.0), cell("force_x", "hover", 0.5, 9.0, regime="low")]
+    phase = np.repeat([KINDS.index(k) for k in ("take-off", "hover", "landing")], len(TIME_S) // 3)
+    drawn = pictures(flight(SECONDS, FORWARD, phase=phase), whole_map=whole_map).signal
+    np.testing.assert_allclose(drawn.floor, np.repeat([1.0, 0.5, np.nan], len(TIME_S) // 3))
+
+
+@pytest.mark.parametrize("band_hz", [(0.0, 0.5), (2.0, 6.0), (25.0, 50.0)])
+def test_two_thirds_of_white_noise_at_its_floor_lie_within_the_floor(band_hz):
+    """As of any normal variable within one standard deviation: 68 %."""
+    flown = [flight(60.0, noise(60.0, 1.0, i) * [1.0, 0.0, 0.0], name=str(i)) for i in range(6)]
+    drawn = pictures(flown[0], cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)],
+                     whole_map=gap_map(FLOOR, flown[:1], flown[1:]).cells).signal
+    assert np.mean(np.abs(drawn.before) < drawn.floor) == pytest.approx(0.683, abs=0.06)
 
 
 def test_measured_is_the_model_and_the_gap_together():
@@ -81,10 +103,12 @@ def test_height_is_drawn_beside_a_ground_effect_alone_and_where_it_is_known():
 
 
 def test_nothing_is_drawn_where_nothing_is_judged():
-    drawn = pictures(replace(whole_flight := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
+    drawn = pictures(replace(whole_flight := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)),
+                     whole_map=[LOWEST, replace(LOWEST, band_hz=(0.5, 2.0))])
     assert whole_flight.usable.all()
     np.testing.assert_array_equal(np.isfinite(drawn.signal.before), used)
     np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
+    np.testing.assert_array_equal(np.isfinite(drawn.signal.floor), used)
 
 
 @pytest.mark.parametrize("band_hz", [(0.0, 0.5), (25.0, 50.0)])

@@ -20,6 +20,7 @@ from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
 GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
@@ -47,8 +48,9 @@ class Signal:
     """One channel of one flight up to a frequency; curves (n,), NaN where nothing is judged.
 
     measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
-    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: of the headline's cell;
-    height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known.
+    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: rms of the floor up to
+    that frequency in the sample's phase, NaN where the map does not have it; height_m: of the rotors over the ground
+    below, None where no effect of the ground is named or it is not known.
     """
 
     flight: str
@@ -60,7 +62,7 @@ class Signal:
     measured: np.ndarray | None
     before: np.ndarray
     after: np.ndarray | None
-    floor: float
+    floor: np.ndarray
     height_m: np.ndarray | None = None
 
 
@@ -90,11 +92,11 @@ class Pictures:
 
 
 def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-                cells: Sequence[Cell]) -> Pictures:
+                cells: Sequence[Cell], whole_map: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis.
 
     cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
-    without any, the commands are all.
+    without any, the commands are all. whole_map: every cell of the map, whose floors are drawn.
     """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
     if not cells or not flights:
@@ -104,21 +106,33 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     median = _median_residual(residuals, cells[0].channel)
-    signal = None if median is None else _signal(median, cells[0])
+    signal = None if median is None else _signal(median, cells[0], whole_map)
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
                     _spectra(study, residuals, effects, channels), commands)
 
 
-def _signal(residual: FlightResidual, cell: Cell) -> Signal:
+def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
     """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_CUTOFF_HZ."""
     flight, c = residual.flight, COLUMN[cell.channel]
     highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_CUTOFF_HZ)
     measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
+    before = _lowpass(flight, residual.before[:, c], highest_hz)
+    floor = np.where(np.isfinite(before), _floors(cell.channel, highest_hz, whole_map)[flight.phase], np.nan)
     return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, measured, _lowpass(flight, residual.before[:, c], highest_hz), after, cell.floor)
+                  flight.phase, measured, before, after, floor)
+
+
+def _floors(channel: str, highest_hz: float, whole_map: Sequence[Cell]) -> np.ndarray:
+    """Rms (len(KINDS),) of a channel's floor up to a frequency in each phase; NaN where the map lacks a band of it.
+
+    The bands' mean squares add up, as their gains are power-complementary (`filter_bank`).
+    """
+    of_cell = {(c.phase, c.band_hz): c.floor for c in whole_map if c.channel == channel and c.regime == "all"}
+    bands = [band for band in MAP_BANDS_HZ if band[1] <= highest_hz]
+    return np.sqrt([sum(of_cell.get((kind, band), np.nan) ** 2 for band in bands) for kind in KINDS])
 
 
 def _height(flight: Flight) -> np.ndarray | None:
