@@ -58,6 +58,23 @@ def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown(dr
     assert not ax.collections and "floor" not in ax.get_legend_handles_labels()[1]
 
 
+@pytest.mark.parametrize("worst", [-9.0, 9.0])
+def test_every_curve_is_in_view_where_it_is_largest(drawn, worst):
+    """The effect named does worst at lift-off, in 2 % of a flight; a spike of a fifth of that sets no scale."""
+    before = np.full(1000, 2.0)
+    after, spiked = np.zeros(1000), np.zeros(1000)
+    after[100:120], spiked[100:104] = worst, worst
+    curves = Signal("a.csv", "force_x", 2.0, "m/s^2", np.arange(1000) * 0.01, np.zeros(1000, int),
+                    np.zeros(1000), before, after, np.full(1000, 4.0))
+    for ax in drawn(gap_figures.signals, curves).axes:
+        low, high = ax.get_ylim()
+        for name, curve in lines(ax).items():
+            assert low < curve.min() and curve.max() < high, name
+    assert drawn(gap_figures.signals, curves).axes[1].get_ylim()[0] < -4.0  # of the floor
+    for ax in drawn(gap_figures.signals, replace(curves, after=spiked)).axes:
+        assert np.abs(ax.get_ylim()).max() < 9.0
+
+
 def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):
     """It is broader, and drawn first."""
     equal = replace(signal(), after=np.full(100, 2.0))

@@ -31,6 +31,7 @@ PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "
 
 def signals(signal: Signal) -> bytes:
     """PNG of one channel of one flight up to a frequency: measured, modelled, their difference, the height."""
+    gaps = [gap for gap in (signal.before, signal.after) if gap is not None]
     rows = 1 + (signal.measured is not None) + (signal.height_m is not None)
     with style(PHONE):
         figure, axes = _column(rows, 1.6, LEGENDS)
@@ -41,7 +42,7 @@ def signals(signal: Signal) -> bytes:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
                              label="model with effect")
             axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{_unit(signal.unit)}")
-            limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
+            limit(axes[0], signal.measured, *(signal.measured - gap for gap in gaps), **SIGNAL_LIMITS)
         gap = axes[0 if signal.measured is None else 1]
         if np.isfinite(signal.floor).any():
             gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", color=FLOOR, alpha=0.4, lw=0,
@@ -54,7 +55,7 @@ def signals(signal: Signal) -> bytes:
             axes[-1].plot(signal.time_s, signal.height_m, color=BLUE, lw=1.0, label="height over the ground below")
             axes[-1].set_ylabel("height\nm")
         axes[-1].set_xlabel("time, s")
-        limit(gap, signal.before, -signal.floor, signal.floor, **SIGNAL_LIMITS)
+        limit(gap, *gaps, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
