@@ -137,6 +137,19 @@ def test_powers_are_labelled_in_plain_text(drawn):
     assert len(ax.get_yticks()) > 2
 
 
+@pytest.mark.parametrize(("least", "most"), [
+    (2e-9, 7e-9), (3.0, 3.0), (5e-10, 5e-9), (9e-7, 1.1e-4), (1e-12, 1e-12), (1e-2, 1e-1), (1e-11, 1e-6), (1e-12, 1e9)])
+def test_two_powers_at_least_can_be_read_and_no_more_than_fit(drawn, least, most):
+    """Of the labels in view; the data stay in view too, and take half of the pane where they span a decade."""
+    power = np.geomspace(least, most, 51)
+    (ax,) = drawn(gap_figures.spectra, FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    low, high = ax.get_ylim()
+    labels = [t.get_text() for y, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if low <= y <= high]
+    assert 2 <= len(set(labels)) == len(labels) <= 5
+    assert low <= least and most <= high
+    assert np.log10(most / least) < 1.0 or np.log10(high / low) < 2.0 * np.log10(most / least)
+
+
 @pytest.mark.parametrize("nominal", [{}, {"roll": np.ones(5), "yaw": np.ones(5)}])
 def test_commands_have_a_pane_for_each_axis_and_nominal_flights_beside(drawn, nominal):
     curves = SimpleNamespace(frequency_hz=np.arange(1.0, 6.0), flown={"roll": np.full(5, 2.0), "yaw": np.full(5, 3.0)},

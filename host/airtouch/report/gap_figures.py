@@ -21,6 +21,7 @@ BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
+MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
 #: of a plot with a legend above each pane, and of one with titles and one legend above all
 LEGENDS, TITLES = Room(left_in=0.85, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
@@ -117,9 +118,24 @@ def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     for ax in axes:
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
-        ax.yaxis.set_minor_formatter(NullFormatter())
+        _power_axis(ax)
     axes[-1].set_xlabel("frequency, Hz")
+
+
+def _power_axis(ax: Axes) -> None:
+    """Label powers of ten on a log axis of power, from two to MOST_LABELS; its limits are widened where none are."""
+    low, high = np.log10(ax.get_ylim())
+    first, last = int(np.ceil(low)), int(np.floor(high))
+    while last <= first:  # to the nearer power outside
+        if first - 1 - low > high - last - 1:
+            first, low = first - 1, first - 1.0
+        else:
+            last, high = last + 1, last + 1.0
+    ax.set_ylim(10.0 ** low, 10.0 ** high)
+    step = -(-(last - first + 1) // MOST_LABELS)
+    ax.set_yticks(10.0 ** np.arange(first, last + 1, step))
+    ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def power_of_ten(x: float, _place: int | None = None) -> str:

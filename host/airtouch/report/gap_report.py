@@ -150,7 +150,8 @@ def _plots(pictures: Pictures) -> list[Plot]:
                           partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:
         plots.append(Plot("Spectra of the motor commands",
-                          "Delays, gains and noise in the loop show here, as a shape that differs.",
+                          "Delays, gains and noise in the loop show here, as a shape that differs. They are looked for "
+                          "in the loops of thrust, roll and pitch alone, so the yaw command is not drawn.",
                           partial(gap_figures.commands, pictures.commands)))
     return plots
 
