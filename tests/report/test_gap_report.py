@@ -55,7 +55,8 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
     for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
                  "no velocity",
                  "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>",
-                 "another fits better", "airtouch collect --mission hover", "yaw command is not drawn"):
+                 "another fits better", "airtouch collect --mission hover", "yaw command is not drawn",
+                 "count only the nats beyond the scatter of nominal flights"):
         assert part in text, part
     assert sum(v.startswith("data:") for v in page.loaded) == 3
     with pytest.raises(AirTouchError, match="--force"):
