@@ -59,8 +59,15 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
                  "count only the nats beyond the scatter of nominal flights"):
         assert part in text, part
     assert sum(v.startswith("data:") for v in page.loaded) == 3
+    assert "random effect" not in text  # a bias of the IMU is none
     with pytest.raises(AirTouchError, match="--force"):
         gap_report.write_diagnosis(path, result, command="x")
+
+
+def test_the_curve_of_a_random_effect_is_explained_where_one_is_named(pushed_flights, tmp_path):
+    noise = NamedEffect("imu_noise", {"factor": Quantity(2.0)})
+    gap_report.write_diagnosis(tmp_path / "gap.html", of_flights(pushed_flights[:1], (noise,)), command="x")
+    assert "A random effect cannot be predicted sample by sample" in (tmp_path / "gap.html").read_text()
 
 
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):

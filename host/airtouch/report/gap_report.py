@@ -143,7 +143,7 @@ def _plots(pictures: Pictures) -> list[Plot]:
                           partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = "Mean over the flights."
-        if any(s.after is not None for s in pictures.spectra):
+        if pictures.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one.")
         plots.append(Plot("Spectra of the gap in the air", text,

@@ -189,11 +189,13 @@ def test_spectrum_after_a_random_effect_is_near_the_floor():
     louder = terms("imu_noise")[0].fitted(np.ones(1))
     factor = louder.values["factor"]
     noisy_flight = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
-    (spectrum,) = pictures(noisy_flight, effects=[louder]).spectra
+    curves = pictures(noisy_flight, effects=[louder])
+    (spectrum,) = curves.spectra
     above = slice(2, -1)
     assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
     off = np.abs(spectrum.after - spectrum.floor)[above].mean()
     assert off < 0.3 * (spectrum.before - spectrum.floor)[above].mean()
+    assert curves.random and not pictures(noisy_flight, effects=[bias(0.4)]).random
 
 
 def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():

@@ -82,13 +82,15 @@ class Pictures:
     """Every curve of a report.
 
     signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
-    spectra; commands: None where no flight has a steady stretch.
+    spectra; commands: None where no flight has a steady stretch; random: whether an effect that acts at random is
+    among those named.
     """
 
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     spectra: tuple[Spectrum, ...] = ()
     commands: MeanSpectra | None = None
+    random: bool = False
 
 
 def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
@@ -110,7 +112,7 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
-                    _spectra(study, residuals, effects, channels), commands)
+                    _spectra(study, residuals, effects, channels), commands, bool(random_of(effects)))
 
 
 def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
