@@ -94,6 +94,15 @@ def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path
     assert "interval" not in source.split('id="where"')[1].split("</table>")[0]
 
 
+def test_grey_is_explained_so_that_it_holds_for_a_cell_wholly_below_its_floor(tmp_path):
+    """The gap is 0.045 to 0.055 where the floor is 0.1 to 0.12: the two do not overlap."""
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis([cell("torque_x", "hover", 0.05)], "none", ()),
+                               command="x")
+    source = (tmp_path / "gap.html").read_text()
+    assert gap_tables.AT_FLOOR.background in source.split('class="map"')[1]
+    assert "overlap" not in source and "not surely above their floor" in source
+
+
 def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
     """Sentence, JSON and page have one shrink and one before and after; the calibrated arm is left out."""
     result = of_flights(pushed_flights)
