@@ -81,6 +81,16 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_fligh
     assert title.startswith(gap_tables.in_words(result.headline))
 
 
+def test_the_list_of_the_largest_cells_says_that_the_answers_cell_is_inside_its_floor_and_what_orders_the_others():
+    """The gap 0.1 begins at 0.09, its floor of 0.1 ends at 0.12; the gap of 1 begins at 0.9."""
+    inside, outside = cell("force_x", "hover", 0.1), cell("force_z", "hover", 1.0)
+    note = gap_tables.order_of_largest([inside, outside], inside)
+    assert "answer, which does not stand out from its floor." in note and "lower end of the gap's interval" in note
+    assert "which does not" not in gap_tables.order_of_largest([outside, inside], outside)
+    assert gap_tables.order_of_largest([outside]).startswith("The cells stand out")
+    assert gap_tables.order_of_largest([replace(outside, low=None, high=None)]) == ""
+
+
 def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path):
     """As those of flights without a gyro: one gap is above its floor, one is not, and neither has blocks."""
     bare = {"low": None, "high": None, "floor_high": None, "blocks": 0}
@@ -90,6 +100,7 @@ def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path
     grey = re.findall(rf'<td[^>]* style="background:{gap_tables.AT_FLOOR.background}[^>]*>([^<]*)', source)
     assert "1 of 2 cells over the floor" in source and grey == ["0.5×"]
     titles = re.findall(r'<td[^>]* title="([^"]*)"', source)
+    assert "The blue row is the cell of the answer." in source
     assert len(titles) == 2 and all(t.endswith("floor 0.1 m/s^2, 1 flight") for t in titles), titles
     assert "interval" not in source.split('id="where"')[1].split("</table>")[0]
 

@@ -92,7 +92,8 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     return rendered("gap.html", **{
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
         "legend": gap_tables.LEGEND, "has_headline": headline is not None,
-        "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
+        "where": gap_tables.largest_rows(where, headline), "where_note": gap_tables.order_of_largest(where, headline),
+        "images": _images(pictures),
         "example": example_effect() if shows_how_to_add else "",
         "has_after": any(c.after is not None for c in cells),
         "has_intervals": any(c.low is not None for c in cells), "version": __version__})

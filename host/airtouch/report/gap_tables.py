@@ -106,6 +106,18 @@ def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[di
              "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(c.ratio)} for c in cells]
 
 
+def order_of_largest(cells: Sequence[Cell], headline: Cell | None = None) -> str:
+    """Which row of the largest cells is marked, whether it stands out, and in what order the others follow."""
+    parts = []
+    if headline is not None:
+        inside = "" if summary.stands_out(headline) else ", which does not stand out from its floor"
+        parts.append(f"The blue row is the cell of the answer{inside}.")
+    if any(c.low is not None for c in cells):
+        parts.append(f"The {'others' if parts else 'cells'} stand out, the surest first: by the lower end of the gap's "
+                     "interval over the upper end of the floor's.")
+    return " ".join(parts)
+
+
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """A row for each parameter of the named effects; the first of an effect has its name and its seconds."""
     rows = []
