@@ -7,7 +7,7 @@ asked for and written out.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import format_of, leading, seconds_in_words
+from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, seconds_in_words
 from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
@@ -31,7 +31,6 @@ AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
 #: (background colour, text colour, text) of each shade
 LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
           *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
-SHRINK_FORM = "{:.2f}"  #: format of a shrink
 MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
 
 

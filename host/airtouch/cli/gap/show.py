@@ -79,7 +79,8 @@ def diagnosis(screen: Console, result: Diagnosis) -> None:
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
     for r in words.leading(result.ranking):
-        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}") if r.measured else "-", r.why)
+        shrink = words.quantity(r.shrink, words.SHRINK_FORM) if r.measured else "-"
+        table.add_row(r.name, f"{r.probability:.1%}", shrink, r.why)
     screen.print(table)
     for group in result.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")

@@ -9,6 +9,7 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import band_in_words
 
 MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen. A larger number makes a longer table
+SHRINK_FORM = "{:z.2f}"  #: format of a shrink; z: 0.00, not -0.00
 DECIMALS = 1  #: of the seconds and ratios of an open cell that are shown
 
 
