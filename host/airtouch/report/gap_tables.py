@@ -12,7 +12,7 @@ from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, gap, in_words, interval, place_in_words, short
 from airtouch.report.columns import WithInterval
 
 
@@ -100,7 +100,7 @@ def heat_map_cell(cell: Cell) -> dict[str, str]:
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """Rows of the largest cells, in their units, with the effect that takes most from each beside its unit."""
-    return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": short(c.gap),
+    return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": gap(c),
              "interval": interval(c), "after": "-" if c.after is None else short(c.after), "floor": short(c.floor),
              "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(c.ratio)} for c in cells]
 
