@@ -200,7 +200,7 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     if len(comparison.judged) < len(comparison.usable):
         notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
                      "chosen")
-    without_block = [f.name for f in comparison.judged if not len(starts(f, AIR))]
+    without_block = [f.file_name for f in comparison.judged if not len(starts(f, AIR))]
     if without_block:
         notes.append(f"too short to be judged, without {BLOCK_S:g} s in the air that have no hole: "
                      + ", ".join(without_block))
