@@ -75,6 +75,15 @@ def test_every_curve_is_in_view_where_it_is_largest(drawn, worst):
         assert np.abs(ax.get_ylim()).max() < 9.0
 
 
+@pytest.mark.parametrize("size", [0.003, 10.0, 100.0, 1000.0])
+def test_no_label_leaves_the_plot(drawn, size):
+    curve = size * np.sin(TIME_S)
+    figure = drawn(gap_figures.signals, replace(signal(), measured=3.0 * curve, before=curve, after=-curve))
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        assert ax.yaxis.label.get_window_extent().x0 >= 0.0
+
+
 def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):
     """It is broader, and drawn first."""
     equal = replace(signal(), after=np.full(100, 2.0))

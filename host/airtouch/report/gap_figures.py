@@ -24,7 +24,7 @@ LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/H
 MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
 #: of a plot with a legend above each pane, and of one with titles and one legend above all
-LEGENDS, TITLES = Room(left_in=0.85, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
+LEGENDS, TITLES = Room(left_in=1.0, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: colour behind the curves of each phase that is shaded
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
