@@ -146,6 +146,15 @@ def test_powers_are_labelled_in_plain_text(drawn):
     assert len(ax.get_yticks()) > 2
 
 
+def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others(drawn):
+    power = np.full(51, 4.0)
+    shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]
+    figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
+    assert [set(lines(ax)) for ax in figure.axes] == [{"before"}, {"before", "floor"}]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["N²/Hz", "(m/s²)²/Hz"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["floor", "before"]
+
+
 @pytest.mark.parametrize(("least", "most"), [
     (2e-9, 7e-9), (3.0, 3.0), (5e-10, 5e-9), (9e-7, 1.1e-4), (1e-12, 1e-12), (1e-2, 1e-1), (1e-11, 1e-6), (1e-12, 1e9)])
 def test_two_powers_at_least_can_be_read_and_no_more_than_fit(drawn, least, most):

@@ -76,9 +76,10 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
                 if power is not None:
                     ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), label=label, **look)
             ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left", y=TITLE_AT)
-            ax.set_ylabel(f"({_unit(spectrum.unit)})²/Hz")
+            unit = _unit(spectrum.unit)
+            ax.set_ylabel(f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz")
             ax.grid(alpha=0.2)
-        _legend(figure, axes[0])
+        _legend(figure, axes)
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
         return png(figure, PHONE_DPI)
 
@@ -95,7 +96,7 @@ def commands(curves: MeanSpectra) -> bytes:
             ax.set_title(f"{name} command", loc="left", y=TITLE_AT)
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
-        _legend(figure, axes[0])
+        _legend(figure, axes)
         _frequency_axis(axes, (2, 5, 10, 20, 40))
         return png(figure, PHONE_DPI)
 
@@ -107,9 +108,9 @@ def _column(rows: int, pane_in: float, room: Room) -> tuple[Figure, np.ndarray]:
     return figure, axes[:, 0]
 
 
-def _legend(figure: Figure, ax: Axes) -> None:
-    """One legend above all panes."""
-    handles, labels = ax.get_legend_handles_labels()
+def _legend(figure: Figure, axes: np.ndarray) -> None:
+    """One legend above all panes, of that with most curves."""
+    handles, labels = max((ax.get_legend_handles_labels() for ax in axes), key=lambda pair: len(pair[1]))
     figure.legend(handles, labels, loc="upper center", ncols=len(labels))
 
 

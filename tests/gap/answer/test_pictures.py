@@ -9,9 +9,10 @@ from airtouch.gap.answer.pictures import MOST_SPECTRA, pictures_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import NamedEffect, Quantity
-from airtouch.gap.signals.channels import COLUMN, angular_acceleration
+from airtouch.gap.signals.channels import COLUMN, COUNT, angular_acceleration
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.signatures.candidates import term_of, terms
+from airtouch.gap.study import Study
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
@@ -177,6 +178,14 @@ def test_floor_of_a_spectrum_is_measured_where_nine_blocks_are_known_and_the_sen
     (spectrum,) = pictures(hover(1, length_s=SECONDS), study=study).spectra
     declared = 2.0 * PERIOD_S * sensor_noise(VEHICLE)[COLUMN["force_x"]] ** 2
     np.testing.assert_allclose(spectrum.floor[1:-1], rise * declared, rtol=1e-6)
+
+
+def test_a_command_has_no_floor_where_no_nominal_flights_give_one(monkeypatch):
+    """The noise of the sensors, which stands for them, is not in a command."""
+    monkeypatch.setattr(Study, "residual", lambda *_: np.random.default_rng(0).normal(size=(len(TIME_S), COUNT)))
+    force, command = pictures(hover(1, length_s=SECONDS),
+                              cells=[cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]).spectra
+    assert force.floor is not None and command.channel == "command_yaw" and command.floor is None
 
 
 def test_spectrum_after_lacks_the_power_of_a_mean_effect():

@@ -68,13 +68,16 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`."""
+    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`.
+
+    floor: None where nothing is known of it, as of a command without enough nominal flights.
+    """
 
     channel: str
     unit: str
     before: np.ndarray
     after: np.ndarray | None
-    floor: np.ndarray
+    floor: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -186,7 +189,8 @@ def _spectra(study: Study, residuals: Sequence[FlightResidual], effects: Sequenc
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = _mean_of_known([_power(r.flight, r.before) for r in airborne])
     after = _power_after(study, airborne, effects, floor) if effects else None
-    return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
+    return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c],
+                          floor[:, c] if (floor[1:, c] > LEAST_FLOOR_POWER).any() else None)
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
 
 
