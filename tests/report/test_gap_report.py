@@ -202,3 +202,10 @@ def test_any_effect_can_be_shown(pushed_flights, name):
 def test_the_page_shows_the_docs_own_effect():
     page = (Path(airtouch.__file__).parents[1] / "docs/effects.md").read_text()
     assert gap_report.example_effect() in page
+
+
+def test_a_ratio_that_stays_is_written_alike_before_and_after():
+    stays = gap_tables.heat_map_cell(cell("force_x", "hover", 0.3, after=0.3))
+    assert stays["text"] == stays["after"] == "3.0×"
+    shrunk = gap_tables.heat_map_cell(cell("force_x", "hover", 2.34, after=0.092))
+    assert (shrunk["text"], shrunk["after"]) == ("23×", "0.9×")

@@ -93,9 +93,14 @@ def heat_map_cell(cell: Cell) -> dict[str, str]:
     title = "; ".join([in_words(cell), ", ".join(filter(None, [
         f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
         f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
-    after = "" if cell.after is None or not stands_out else f"{short(cell.ratio_after)}×"
-    return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": shade.background,
+    after = "" if cell.after is None or not stands_out else _times(cell.ratio_after)
+    return {"text": _times(times), "colour": shade.background,
             "ink": shade.ink, "title": title, "after": after}
+
+
+def _times(ratio: float) -> str:
+    """A ratio of gap to floor as the heat map has it."""
+    return f"{ratio:.0f}×" if ratio >= 9.95 else f"{ratio:.1f}×"
 
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
