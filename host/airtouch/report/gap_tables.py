@@ -7,7 +7,7 @@ asked for and written out.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, seconds_in_words
+from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, printed, seconds_in_words
 from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
@@ -129,7 +129,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
         name, seconds = effect.name, seconds_in_words(effect)
         for parameter, q in effect.parameters.items():
             form = format_of(q)
-            rows.append({"effect": name, "parameter": parameter, "value": form.format(q.value),
+            rows.append({"effect": name, "parameter": parameter, "value": form.format(printed(q)),
                          "interval": _interval(q, form), "unit": "" if q.unit == "1" else q.unit,
                          "seconds": f"acts {seconds}" if seconds else ""})
             name = seconds = ""
@@ -175,7 +175,7 @@ def _shrink(shrink: Quantity | None) -> WithInterval:
 def with_interval(q: Quantity, form: str) -> WithInterval:
     """A quantity with its unit, and its interval. form: format of a number, as `{:.2f}`."""
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
-    return WithInterval(form.format(q.value) + unit, _interval(q, form))
+    return WithInterval(form.format(printed(q)) + unit, _interval(q, form))
 
 
 def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, WithInterval]]:
