@@ -36,7 +36,7 @@ def lines(ax):
 
 def signal(measured=True, after=True, phase=None):
     steps = np.zeros(100, int) if phase is None else phase
-    return Signal("a.csv", "force_x", 2.0, "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
+    return Signal("a.csv", "force_x", (0.0, 2.0), "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
                   np.full(100, 2.0), np.full(100, 0.5) if after else None, np.full(100, 0.25))
 
 
@@ -64,7 +64,7 @@ def test_every_curve_is_in_view_where_it_is_largest(drawn, worst):
     before = np.full(1000, 2.0)
     after, spiked = np.zeros(1000), np.zeros(1000)
     after[100:120], spiked[100:104] = worst, worst
-    curves = Signal("a.csv", "force_x", 2.0, "m/s^2", np.arange(1000) * 0.01, np.zeros(1000, int),
+    curves = Signal("a.csv", "force_x", (0.0, 2.0), "m/s^2", np.arange(1000) * 0.01, np.zeros(1000, int),
                     np.zeros(1000), before, after, np.full(1000, 4.0))
     for ax in drawn(gap_figures.signals, curves).axes:
         low, high = ax.get_ylim()

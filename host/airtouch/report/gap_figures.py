@@ -31,7 +31,7 @@ PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "
 
 
 def signals(signal: Signal) -> bytes:
-    """PNG of one channel of one flight up to a frequency: measured, modelled, their difference, the height."""
+    """PNG of one channel of one flight in a band: measured, modelled, their difference, the height."""
     gaps = [gap for gap in (signal.before, signal.after) if gap is not None]
     rows = 1 + (signal.measured is not None) + (signal.height_m is not None)
     with style(PHONE):

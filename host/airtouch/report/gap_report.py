@@ -35,7 +35,7 @@ from airtouch.report.html_page import data_url, rendered
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what is grey in the plot of a signal
-FLOOR_DRAWN = "Grey: the floor up to this frequency (rms) in each phase. "
+FLOOR_DRAWN = "Grey: the floor in this band (rms) in each phase. "
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -138,7 +138,8 @@ def _plots(pictures: Pictures) -> list[Plot]:
     if pictures.signal is not None:
         signal = pictures.signal
         floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
-        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.highest_hz:g} Hz",
+        low, high = signal.band_hz
+        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
                           "over a platform.",
                           partial(gap_figures.signals, signal)))

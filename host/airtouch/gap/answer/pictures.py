@@ -19,7 +19,7 @@ from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, band_passed
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
@@ -45,17 +45,17 @@ class FlightResidual:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel of one flight up to a frequency; curves (n,), NaN where nothing is judged.
+    """One channel of one flight in a band of frequencies; curves (n,), NaN where nothing is judged.
 
     measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
-    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: rms of the floor up to
-    that frequency in the sample's phase, NaN where the map does not have it; height_m: of the rotors over the ground
+    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: rms of the floor in
+    that band and the sample's phase, NaN where the map does not have it; height_m: of the rotors over the ground
     below, None where no effect of the ground is named or it is not known.
     """
 
     flight: str
     channel: str
-    highest_hz: float
+    band_hz: tuple[float, float]
     unit: str
     time_s: np.ndarray
     phase: np.ndarray
@@ -119,25 +119,37 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
 
 
 def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
-    """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_CUTOFF_HZ."""
-    flight, c = residual.flight, COLUMN[cell.channel]
-    highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_CUTOFF_HZ)
-    measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
+    """The curves of one flight in a cell's channel and band (`_band`)."""
+    flight, c, band_hz = residual.flight, COLUMN[cell.channel], _band(cell, whole_map)
+    measured, after = (None if values is None else _band_passed(flight, values, band_hz)
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
-    before = _lowpass(flight, residual.before[:, c], highest_hz)
-    floor = np.where(np.isfinite(before), _floors(cell.channel, highest_hz, whole_map)[flight.phase], np.nan)
-    return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
+    before = _band_passed(flight, residual.before[:, c], band_hz)
+    floor = np.where(np.isfinite(before), _floors(cell.channel, band_hz, whole_map)[flight.phase], np.nan)
+    return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, measured, before, after, floor)
 
 
-def _floors(channel: str, highest_hz: float, whole_map: Sequence[Cell]) -> np.ndarray:
-    """Rms (len(KINDS),) of a channel's floor up to a frequency in each phase; NaN where the map lacks a band of it.
+def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
+    """Band in which a cell's signal is drawn, Hz: its own; up to LEAST_CUTOFF_HZ where it and the map's others are."""
+    low = [band for band in MAP_BANDS_HZ if band[1] <= LEAST_CUTOFF_HZ]
+    in_map = {c.band_hz for c in whole_map if c.channel == cell.channel}
+    own = cell.band_hz in MAP_BANDS_HZ and not (cell.band_hz in low and in_map.issuperset(low))
+    return cell.band_hz if own else (0.0, LEAST_CUTOFF_HZ)
 
-    The bands' mean squares add up, as their gains are power-complementary (`filter_bank`).
+
+def _within(band_hz: tuple[float, float]) -> list[int]:
+    """Places in MAP_BANDS_HZ of the bands that lie within a wider one."""
+    return [i for i, (low, high) in enumerate(MAP_BANDS_HZ) if band_hz[0] <= low and high <= band_hz[1]]
+
+
+def _floors(channel: str, band_hz: tuple[float, float], whole_map: Sequence[Cell]) -> np.ndarray:
+    """Rms (len(KINDS),) of a channel's floor in a band in each phase; NaN where the map lacks a part of it.
+
+    The mean squares of the map's bands add up, as their gains are power-complementary (`filter_bank`).
     """
     of_cell = {(c.phase, c.band_hz): c.floor for c in whole_map if c.channel == channel and c.regime == "all"}
-    bands = [band for band in MAP_BANDS_HZ if band[1] <= highest_hz]
-    return np.sqrt([sum(of_cell.get((kind, band), np.nan) ** 2 for band in bands) for kind in KINDS])
+    parts = [MAP_BANDS_HZ[i] for i in _within(band_hz)]
+    return np.sqrt([sum(of_cell.get((kind, part), np.nan) ** 2 for part in parts) for kind in KINDS])
 
 
 def _height(flight: Flight) -> np.ndarray | None:
@@ -167,15 +179,13 @@ def _measured(flight: Flight, channel: int) -> np.ndarray | None:
     return None
 
 
-def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarray:
-    """Values (n,) in the bands that end at a frequency or below it, NaN where nothing is judged."""
-    out, bands = np.full(len(values), np.nan), sum(end <= highest_hz for _, end in MAP_BANDS_HZ)
+def _band_passed(flight: Flight, values: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
+    """Values (n,) in a band, NaN where nothing is judged."""
+    out = np.full(len(values), np.nan)
     for start, stop in stretches(flight):
         valid = ~flight.bridged[start:stop]
         here = interpolate_over(values[start:stop, None], valid)
-        if bands < len(MAP_BANDS_HZ):
-            here = low_passed(here, bands)
-        out[start:stop] = np.where(valid, here[:, 0], np.nan)
+        out[start:stop] = np.where(valid, band_passed(here, _within(band_hz))[:, 0], np.nan)
     return out
 
 
