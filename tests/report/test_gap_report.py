@@ -67,7 +67,9 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
 def test_the_curve_of_a_random_effect_is_explained_where_one_is_named(pushed_flights, tmp_path):
     noise = NamedEffect("imu_noise", {"factor": Quantity(2.0)})
     gap_report.write_diagnosis(tmp_path / "gap.html", of_flights(pushed_flights[:1], (noise,)), command="x")
-    assert "A random effect cannot be predicted sample by sample" in (tmp_path / "gap.html").read_text()
+    text, _ = checked(tmp_path / "gap.html")
+    assert "A random effect cannot be predicted sample by sample" in text
+    assert "these curves hold the mean alone" in text
 
 
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):

@@ -137,11 +137,12 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
+        random = " Of a random effect these curves hold the mean alone." if pictures.random else ""
         floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
         low, high = signal.band_hz
         plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
-                          "over a platform.",
+                          f"over a platform.{random}",
                           partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = "Mean over the flights."
