@@ -105,7 +105,7 @@ def test_height_is_below_the_signal_of_a_ground_effect(drawn, measured):
 
 def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):
     (only,) = drawn(gap_figures.signals, signal(measured=False, after=False)).axes
-    assert set(lines(only)) == {"gap before"} and only.get_ylabel() == "measured - model\nm/s²"
+    assert set(lines(only)) == {"gap"} and only.get_ylabel() == "measured - model\nm/s²"
 
 
 def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
@@ -128,7 +128,7 @@ def test_spectra_have_a_pane_for_each_channel(drawn, after):
     figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
     assert [(ax.get_title(loc="left"), ax.get_ylabel()) for ax in figure.axes] == [
         ("forward force", "(m/s²)²/Hz"), ("yaw torque", "(rad/s²)²/Hz")]
-    expected = {"floor": 1.0, "before": 4.0} | ({"after": 2.0} if after else {})
+    expected = {"floor": 1.0, "before": 4.0, "after": 2.0} if after else {"floor": 1.0, "gap": 4.0}
     for ax in figure.axes:
         assert {name: y[0] for name, y in lines(ax).items()} == expected
     assert figure.axes[-1].get_xlabel() == "frequency, Hz"
@@ -150,9 +150,9 @@ def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that
     power = np.full(51, 4.0)
     shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]
     figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
-    assert [set(lines(ax)) for ax in figure.axes] == [{"before"}, {"before", "floor"}]
+    assert [set(lines(ax)) for ax in figure.axes] == [{"gap"}, {"gap", "floor"}]
     assert [ax.get_ylabel() for ax in figure.axes] == ["N²/Hz", "(m/s²)²/Hz"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["floor", "before"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["floor", "gap"]
 
 
 @pytest.mark.parametrize(("least", "most"), [

@@ -49,7 +49,7 @@ def signals(signal: Signal) -> bytes:
         if np.isfinite(signal.floor).any():
             gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", color=FLOOR, alpha=0.5, lw=0,
                              zorder=ABOVE, label="floor")
-        gap.plot(signal.time_s, signal.before, label="gap before", **BEHIND)
+        gap.plot(signal.time_s, signal.before, label="gap" if signal.after is None else "gap before", **BEHIND)
         if signal.after is not None:
             gap.plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
         gap.set_ylabel(f"measured - model\n{_unit(signal.unit)}")
@@ -71,7 +71,8 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     with style(PHONE):
         figure, axes = _column(rows, 1.35, TITLES)
         for ax, spectrum in zip(axes, shown, strict=True):
-            looks = {"floor": (spectrum.floor, {"color": FLOOR, "lw": 1.6}), "before": (spectrum.before, BEHIND),
+            before = "gap" if spectrum.after is None else "before"
+            looks = {"floor": (spectrum.floor, {"color": FLOOR, "lw": 1.6}), before: (spectrum.before, BEHIND),
                      "after": (spectrum.after, {"color": AFTER, "lw": 1.0})}
             for label, (power, look) in looks.items():
                 if power is not None:
