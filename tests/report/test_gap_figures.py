@@ -36,8 +36,8 @@ def lines(ax):
 
 def signal(measured=True, after=True, phase=None):
     steps = np.zeros(100, int) if phase is None else phase
-    return Signal("a.csv", "force_x", 2.0, "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
-                  np.full(100, 2.0), np.full(100, 0.5) if after else None, 0.25)
+    return Signal("a.csv", "force_x", (0.0, 2.0), "m/s^2", TIME_S, steps, np.full(100, 5.0) if measured else None,
+                  np.full(100, 2.0), np.full(100, 0.5) if after else None, np.full(100, 0.25))
 
 
 def test_signal_has_measured_and_models_above_and_their_differences_below(drawn):
@@ -46,6 +46,42 @@ def test_signal_has_measured_and_models_above_and_their_differences_below(drawn)
     assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
     assert "floor" in below.get_legend_handles_labels()[1]
     assert above.get_ylabel() == "forward force\nm/s²" and below.get_xlabel() == "time, s"
+
+
+def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown(drawn):
+    floor = np.repeat([0.25, 1.0, np.nan], [50, 25, 25])
+    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=floor)).axes
+    (grey,) = ax.collections
+    for inside, point in ((True, (4.0, 0.2)), (False, (4.0, 0.5)), (True, (6.0, -0.9)), (False, (8.0, 0.0))):
+        assert any(path.contains_point(point) for path in grey.get_paths()) is inside, point
+    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=np.full(100, np.nan))).axes
+    assert not ax.collections and "floor" not in ax.get_legend_handles_labels()[1]
+
+
+@pytest.mark.parametrize("worst", [-9.0, 9.0])
+def test_every_curve_is_in_view_where_it_is_largest(drawn, worst):
+    """The effect named does worst at lift-off, in 2 % of a flight; a spike of a fifth of that sets no scale."""
+    before = np.full(1000, 2.0)
+    after, spiked = np.zeros(1000), np.zeros(1000)
+    after[100:120], spiked[100:104] = worst, worst
+    curves = Signal("a.csv", "force_x", (0.0, 2.0), "m/s^2", np.arange(1000) * 0.01, np.zeros(1000, int),
+                    np.zeros(1000), before, after, np.full(1000, 4.0))
+    for ax in drawn(gap_figures.signals, curves).axes:
+        low, high = ax.get_ylim()
+        for name, curve in lines(ax).items():
+            assert low < curve.min() and curve.max() < high, name
+    assert drawn(gap_figures.signals, curves).axes[1].get_ylim()[0] < -4.0  # of the floor
+    for ax in drawn(gap_figures.signals, replace(curves, after=spiked)).axes:
+        assert np.abs(ax.get_ylim()).max() < 9.0
+
+
+@pytest.mark.parametrize("size", [0.003, 10.0, 100.0, 1000.0])
+def test_no_label_leaves_the_plot(drawn, size):
+    curve = size * np.sin(TIME_S)
+    figure = drawn(gap_figures.signals, replace(signal(), measured=3.0 * curve, before=curve, after=-curve))
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        assert ax.yaxis.label.get_window_extent().x0 >= 0.0
 
 
 def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):
@@ -69,7 +105,7 @@ def test_height_is_below_the_signal_of_a_ground_effect(drawn, measured):
 
 def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):
     (only,) = drawn(gap_figures.signals, signal(measured=False, after=False)).axes
-    assert set(lines(only)) == {"gap before"} and only.get_ylabel() == "measured - model\nm/s²"
+    assert set(lines(only)) == {"gap"} and only.get_ylabel() == "measured - model\nm/s²"
 
 
 def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
@@ -92,7 +128,7 @@ def test_spectra_have_a_pane_for_each_channel(drawn, after):
     figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
     assert [(ax.get_title(loc="left"), ax.get_ylabel()) for ax in figure.axes] == [
         ("forward force", "(m/s²)²/Hz"), ("yaw torque", "(rad/s²)²/Hz")]
-    expected = {"floor": 1.0, "before": 4.0} | ({"after": 2.0} if after else {})
+    expected = {"floor": 1.0, "before": 4.0, "after": 2.0} if after else {"floor": 1.0, "gap": 4.0}
     for ax in figure.axes:
         assert {name: y[0] for name, y in lines(ax).items()} == expected
     assert figure.axes[-1].get_xlabel() == "frequency, Hz"
@@ -108,6 +144,28 @@ def test_powers_are_labelled_in_plain_text(drawn):
         exponent = int("".join(str(unicodedata.digit(c)) for c in digits))
         assert (-exponent if sign else exponent) == round(np.log10(y))
     assert len(ax.get_yticks()) > 2
+
+
+def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others(drawn):
+    power = np.full(51, 4.0)
+    shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]
+    figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
+    assert [set(lines(ax)) for ax in figure.axes] == [{"gap"}, {"gap", "floor"}]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["N²/Hz", "(m/s²)²/Hz"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["floor", "gap"]
+
+
+@pytest.mark.parametrize(("least", "most"), [
+    (2e-9, 7e-9), (3.0, 3.0), (5e-10, 5e-9), (9e-7, 1.1e-4), (1e-12, 1e-12), (1e-2, 1e-1), (1e-11, 1e-6), (1e-12, 1e9)])
+def test_two_powers_at_least_can_be_read_and_no_more_than_fit(drawn, least, most):
+    """Of the labels in view; the data stay in view too, and take half of the pane where they span a decade."""
+    power = np.geomspace(least, most, 51)
+    (ax,) = drawn(gap_figures.spectra, FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    low, high = ax.get_ylim()
+    labels = [t.get_text() for y, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if low <= y <= high]
+    assert 2 <= len(set(labels)) == len(labels) <= 5
+    assert low <= least and most <= high
+    assert np.log10(most / least) < 1.0 or np.log10(high / low) < 2.0 * np.log10(most / least)
 
 
 @pytest.mark.parametrize("nominal", [{}, {"roll": np.ones(5), "yaw": np.ones(5)}])

@@ -55,11 +55,21 @@ def test_page_of_a_diagnosis(pushed_flights, tmp_path):
     for part in ("93.0%", "0.80 to 0.95", "mass and thrust_coefficient", "Weigh the <vehicle>.", "a note",
                  "no velocity",
                  "wrong effect: wind", "imu_bias, vehicle as declared", "airtouch gap diagnose <x>",
-                 "another fits better", "airtouch collect --mission hover"):
+                 "another fits better", "airtouch collect --mission hover", "yaw command is not drawn",
+                 "count only the nats beyond the scatter of nominal flights"):
         assert part in text, part
     assert sum(v.startswith("data:") for v in page.loaded) == 3
+    assert "random effect" not in text  # a bias of the IMU is none
     with pytest.raises(AirTouchError, match="--force"):
         gap_report.write_diagnosis(path, result, command="x")
+
+
+def test_the_curve_of_a_random_effect_is_explained_where_one_is_named(pushed_flights, tmp_path):
+    noise = NamedEffect("imu_noise", {"factor": Quantity(2.0)})
+    gap_report.write_diagnosis(tmp_path / "gap.html", of_flights(pushed_flights[:1], (noise,)), command="x")
+    text, _ = checked(tmp_path / "gap.html")
+    assert "A random effect cannot be predicted sample by sample" in text
+    assert "these curves hold the mean alone" in text
 
 
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):
@@ -73,6 +83,16 @@ def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_fligh
     assert title.startswith(gap_tables.in_words(result.headline))
 
 
+def test_the_list_of_the_largest_cells_says_that_the_answers_cell_is_inside_its_floor_and_what_orders_the_others():
+    """The gap 0.1 begins at 0.09, its floor of 0.1 ends at 0.12; the gap of 1 begins at 0.9."""
+    inside, outside = cell("force_x", "hover", 0.1), cell("force_z", "hover", 1.0)
+    note = gap_tables.order_of_largest([inside, outside], inside)
+    assert "answer, which does not stand out from its floor." in note and "lower end of the gap's interval" in note
+    assert "which does not" not in gap_tables.order_of_largest([outside, inside], outside)
+    assert gap_tables.order_of_largest([outside]).startswith("The cells stand out")
+    assert gap_tables.order_of_largest([replace(outside, low=None, high=None)]) == ""
+
+
 def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path):
     """As those of flights without a gyro: one gap is above its floor, one is not, and neither has blocks."""
     bare = {"low": None, "high": None, "floor_high": None, "blocks": 0}
@@ -82,8 +102,18 @@ def test_cells_without_an_interval_have_colours_by_the_count_above_them(tmp_path
     grey = re.findall(rf'<td[^>]* style="background:{gap_tables.AT_FLOOR.background}[^>]*>([^<]*)', source)
     assert "1 of 2 cells over the floor" in source and grey == ["0.5×"]
     titles = re.findall(r'<td[^>]* title="([^"]*)"', source)
+    assert "The blue row is the cell of the answer." in source
     assert len(titles) == 2 and all(t.endswith("floor 0.1 m/s^2, 1 flight") for t in titles), titles
     assert "interval" not in source.split('id="where"')[1].split("</table>")[0]
+
+
+def test_grey_is_explained_so_that_it_holds_for_a_cell_wholly_below_its_floor(tmp_path):
+    """The gap is 0.045 to 0.055 where the floor is 0.1 to 0.12: the two do not overlap."""
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis([cell("torque_x", "hover", 0.05)], "none", ()),
+                               command="x")
+    source = (tmp_path / "gap.html").read_text()
+    assert gap_tables.AT_FLOOR.background in source.split('class="map"')[1]
+    assert "overlap" not in source and "not surely above their floor" in source
 
 
 def test_sentences_json_and_page_have_the_same_shrink(pushed_flights, tmp_path):
@@ -174,3 +204,10 @@ def test_any_effect_can_be_shown(pushed_flights, name):
 def test_the_page_shows_the_docs_own_effect():
     page = (Path(airtouch.__file__).parents[1] / "docs/effects.md").read_text()
     assert gap_report.example_effect() in page
+
+
+def test_a_ratio_that_stays_is_written_alike_before_and_after():
+    stays = gap_tables.heat_map_cell(cell("force_x", "hover", 0.3, after=0.3))
+    assert stays["text"] == stays["after"] == "3.0×"
+    shrunk = gap_tables.heat_map_cell(cell("force_x", "hover", 2.34, after=0.092))
+    assert (shrunk["text"], shrunk["after"]) == ("23×", "0.9×")

@@ -49,5 +49,6 @@ def of_flights(logs, effects=(FOUND,), **more):
     terms = [term_of(e) for e in effects]
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)
-    pictures = pictures_of(study, flights, [], terms, [result.headline, *whole.cells] if result.headline else [])
+    pictures = pictures_of(study, flights, [], terms, [result.headline, *whole.cells] if result.headline else [],
+                           whole.cells)
     return replace(result, where=tuple(summary.cells_to_show(whole)), pictures=pictures)

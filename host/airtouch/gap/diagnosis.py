@@ -177,7 +177,8 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
-        pictures=pictures_of(study, usable, nominal, terms, cells if headline else ()) if pictures else None)
+        pictures=pictures_of(study, usable, nominal, terms, cells if headline else (), whole_map.cells)
+        if pictures else None)
     return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 
@@ -199,7 +200,7 @@ def _notes(comparison: Comparison, of_logs: Sequence[str]) -> tuple[str, ...]:
     if len(comparison.judged) < len(comparison.usable):
         notes.append(f"candidates were judged on {len(comparison.judged)} of {len(comparison.usable)} flights, evenly "
                      "chosen")
-    without_block = [f.name for f in comparison.judged if not len(starts(f, AIR))]
+    without_block = [f.file_name for f in comparison.judged if not len(starts(f, AIR))]
     if without_block:
         notes.append(f"too short to be judged, without {BLOCK_S:g} s in the air that have no hole: "
                      + ", ".join(without_block))

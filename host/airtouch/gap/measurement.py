@@ -195,5 +195,6 @@ def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog],
     flights = with_gyro_if_any(list(ready_flights(first, vehicle, [])), []) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where)
+    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where,
+                         measurement.map.cells)
     return replace(curves, commands=measurement.spectra)

@@ -18,19 +18,22 @@ BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with 
 PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
 #: look of the gap without the named effects: broad and pale, so that it shows behind the gap with them
 BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
+ABOVE = 2.5  #: zorder of the floor, above that of lines, which is 2: a dense curve would hide it
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
+MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
 #: of a plot with a legend above each pane, and of one with titles and one legend above all
-LEGENDS, TITLES = Room(left_in=0.85, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
+LEGENDS, TITLES = Room(left_in=1.0, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: colour behind the curves of each phase that is shaded
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
 def signals(signal: Signal) -> bytes:
-    """PNG of one channel of one flight up to a frequency: measured, modelled, their difference, the height."""
+    """PNG of one channel of one flight in a band: measured, modelled, their difference, the height."""
+    gaps = [gap for gap in (signal.before, signal.after) if gap is not None]
     rows = 1 + (signal.measured is not None) + (signal.height_m is not None)
     with style(PHONE):
         figure, axes = _column(rows, 1.6, LEGENDS)
@@ -41,10 +44,12 @@ def signals(signal: Signal) -> bytes:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
                              label="model with effect")
             axes[0].set_ylabel(f"{CHANNEL_WORDS[signal.channel]}\n{_unit(signal.unit)}")
-            limit(axes[0], signal.measured, signal.measured - signal.before, **SIGNAL_LIMITS)
+            limit(axes[0], signal.measured, *(signal.measured - gap for gap in gaps), **SIGNAL_LIMITS)
         gap = axes[0 if signal.measured is None else 1]
-        gap.axhspan(-signal.floor, signal.floor, color=FLOOR, alpha=0.25, lw=0, label="floor")
-        gap.plot(signal.time_s, signal.before, label="gap before", **BEHIND)
+        if np.isfinite(signal.floor).any():
+            gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", color=FLOOR, alpha=0.5, lw=0,
+                             zorder=ABOVE, label="floor")
+        gap.plot(signal.time_s, signal.before, label="gap" if signal.after is None else "gap before", **BEHIND)
         if signal.after is not None:
             gap.plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")
         gap.set_ylabel(f"measured - model\n{_unit(signal.unit)}")
@@ -52,7 +57,7 @@ def signals(signal: Signal) -> bytes:
             axes[-1].plot(signal.time_s, signal.height_m, color=BLUE, lw=1.0, label="height over the ground below")
             axes[-1].set_ylabel("height\nm")
         axes[-1].set_xlabel("time, s")
-        limit(gap, signal.before, np.array([-signal.floor, signal.floor]), **SIGNAL_LIMITS)
+        limit(gap, *gaps, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
             ax.margins(x=0)
@@ -66,15 +71,17 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
     with style(PHONE):
         figure, axes = _column(rows, 1.35, TITLES)
         for ax, spectrum in zip(axes, shown, strict=True):
-            looks = {"floor": (spectrum.floor, {"color": FLOOR, "lw": 1.6}), "before": (spectrum.before, BEHIND),
+            before = "gap" if spectrum.after is None else "before"
+            looks = {"floor": (spectrum.floor, {"color": FLOOR, "lw": 1.6}), before: (spectrum.before, BEHIND),
                      "after": (spectrum.after, {"color": AFTER, "lw": 1.0})}
             for label, (power, look) in looks.items():
                 if power is not None:
                     ax.loglog(frequency_hz[1:], np.maximum(power[1:], LEAST_POWER), label=label, **look)
             ax.set_title(CHANNEL_WORDS[spectrum.channel], loc="left", y=TITLE_AT)
-            ax.set_ylabel(f"({_unit(spectrum.unit)})²/Hz")
+            unit = _unit(spectrum.unit)
+            ax.set_ylabel(f"({unit})²/Hz" if "/" in unit else f"{unit}²/Hz")
             ax.grid(alpha=0.2)
-        _legend(figure, axes[0])
+        _legend(figure, axes)
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
         return png(figure, PHONE_DPI)
 
@@ -91,7 +98,7 @@ def commands(curves: MeanSpectra) -> bytes:
             ax.set_title(f"{name} command", loc="left", y=TITLE_AT)
             ax.set_ylabel("N²/Hz")
             ax.grid(alpha=0.2)
-        _legend(figure, axes[0])
+        _legend(figure, axes)
         _frequency_axis(axes, (2, 5, 10, 20, 40))
         return png(figure, PHONE_DPI)
 
@@ -103,9 +110,9 @@ def _column(rows: int, pane_in: float, room: Room) -> tuple[Figure, np.ndarray]:
     return figure, axes[:, 0]
 
 
-def _legend(figure: Figure, ax: Axes) -> None:
-    """One legend above all panes."""
-    handles, labels = ax.get_legend_handles_labels()
+def _legend(figure: Figure, axes: np.ndarray) -> None:
+    """One legend above all panes, of that with most curves."""
+    handles, labels = max((ax.get_legend_handles_labels() for ax in axes), key=lambda pair: len(pair[1]))
     figure.legend(handles, labels, loc="upper center", ncols=len(labels))
 
 
@@ -114,9 +121,24 @@ def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     for ax in axes:
         ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
-        ax.yaxis.set_minor_formatter(NullFormatter())
+        _power_axis(ax)
     axes[-1].set_xlabel("frequency, Hz")
+
+
+def _power_axis(ax: Axes) -> None:
+    """Label powers of ten on a log axis of power, from two to MOST_LABELS; its limits are widened where none are."""
+    low, high = np.log10(ax.get_ylim())
+    first, last = int(np.ceil(low)), int(np.floor(high))
+    while last <= first:  # to the nearer power outside
+        if first - 1 - low > high - last - 1:
+            first, low = first - 1, first - 1.0
+        else:
+            last, high = last + 1, last + 1.0
+    ax.set_ylim(10.0 ** low, 10.0 ** high)
+    step = -(-(last - first + 1) // MOST_LABELS)
+    ax.set_yticks(10.0 ** np.arange(first, last + 1, step))
+    ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def power_of_ten(x: float, _place: int | None = None) -> str:

@@ -13,6 +13,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from airtouch import __version__
 from airtouch.extras import lacking
 from airtouch.gap.answer import words
@@ -32,6 +34,8 @@ from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
+#: what is grey in the plot of a signal
+FLOOR_DRAWN = "Grey: the floor in this band (rms) in each phase. "
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -88,7 +92,8 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
     return rendered("gap.html", **{
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
         "legend": gap_tables.LEGEND, "has_headline": headline is not None,
-        "where": gap_tables.largest_rows(where, headline), "images": _images(pictures),
+        "where": gap_tables.largest_rows(where, headline), "where_note": gap_tables.order_of_largest(where, headline),
+        "images": _images(pictures),
         "example": example_effect() if shows_how_to_add else "",
         "has_after": any(c.after is not None for c in cells),
         "has_intervals": any(c.low is not None for c in cells), "version": __version__})
@@ -132,19 +137,24 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
-        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, up to {signal.highest_hz:g} Hz",
-                          f"Flight {Path(signal.flight).name}. Grey: the floor; blue: take-off and landing; yellow: "
-                          "over a platform.", partial(gap_figures.signals, signal)))
+        random = " Of a random effect these curves hold the mean alone." if pictures.random else ""
+        floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
+        low, high = signal.band_hz
+        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
+                          f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
+                          f"over a platform.{random}",
+                          partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = "Mean over the flights."
-        if any(s.after is not None for s in pictures.spectra):
+        if pictures.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one.")
         plots.append(Plot("Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:
         plots.append(Plot("Spectra of the motor commands",
-                          "Delays, gains and noise in the loop show here, as a shape that differs.",
+                          "Delays, gains and noise in the loop show here, as a shape that differs. They are looked for "
+                          "in the loops of thrust, roll and pitch alone, so the yaw command is not drawn.",
                           partial(gap_figures.commands, pictures.commands)))
     return plots
 

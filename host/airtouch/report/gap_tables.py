@@ -7,12 +7,12 @@ asked for and written out.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import format_of, leading, seconds_in_words
+from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, printed, seconds_in_words
 from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.cell_words import PHASE_WORDS, in_words, interval, place_in_words, short
+from airtouch.gap.where.cell_words import PHASE_WORDS, gap, in_words, interval, place_in_words, short
 from airtouch.report.columns import WithInterval
 
 
@@ -31,7 +31,6 @@ AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
 #: (background colour, text colour, text) of each shade
 LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
           *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
-SHRINK_FORM = "{:.2f}"  #: format of a shrink
 MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
 
 
@@ -94,16 +93,33 @@ def heat_map_cell(cell: Cell) -> dict[str, str]:
     title = "; ".join([in_words(cell), ", ".join(filter(None, [
         f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
         f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
-    after = "" if cell.after is None or not stands_out else f"{short(cell.ratio_after)}×"
-    return {"text": f"{times:.0f}×" if times >= 9.95 else f"{times:.1f}×", "colour": shade.background,
+    after = "" if cell.after is None or not stands_out else _times(cell.ratio_after)
+    return {"text": _times(times), "colour": shade.background,
             "ink": shade.ink, "title": title, "after": after}
+
+
+def _times(ratio: float) -> str:
+    """A ratio of gap to floor as the heat map has it."""
+    return f"{ratio:.0f}×" if ratio >= 9.95 else f"{ratio:.1f}×"
 
 
 def largest_rows(cells: Iterable[Cell], headline: Cell | None = None) -> list[dict[str, Any]]:
     """Rows of the largest cells, in their units, with the effect that takes most from each beside its unit."""
-    return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": short(c.gap),
+    return [{"words": place_in_words(c), "headline": c is headline or c == headline, "gap": gap(c),
              "interval": interval(c), "after": "-" if c.after is None else short(c.after), "floor": short(c.floor),
              "unit": c.unit + (f"; caused by {c.by}" if c.by else ""), "ratio": short(c.ratio)} for c in cells]
+
+
+def order_of_largest(cells: Sequence[Cell], headline: Cell | None = None) -> str:
+    """Which row of the largest cells is marked, whether it stands out, and in what order the others follow."""
+    parts = []
+    if headline is not None:
+        inside = "" if summary.stands_out(headline) else ", which does not stand out from its floor"
+        parts.append(f"The blue row is the cell of the answer{inside}.")
+    if any(c.low is not None for c in cells):
+        parts.append(f"The {'others' if parts else 'cells'} stand out, the surest first: by the lower end of the gap's "
+                     "interval over the upper end of the floor's.")
+    return " ".join(parts)
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -113,7 +129,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
         name, seconds = effect.name, seconds_in_words(effect)
         for parameter, q in effect.parameters.items():
             form = format_of(q)
-            rows.append({"effect": name, "parameter": parameter, "value": form.format(q.value),
+            rows.append({"effect": name, "parameter": parameter, "value": form.format(printed(q)),
                          "interval": _interval(q, form), "unit": "" if q.unit == "1" else q.unit,
                          "seconds": f"acts {seconds}" if seconds else ""})
             name = seconds = ""
@@ -159,7 +175,7 @@ def _shrink(shrink: Quantity | None) -> WithInterval:
 def with_interval(q: Quantity, form: str) -> WithInterval:
     """A quantity with its unit, and its interval. form: format of a number, as `{:.2f}`."""
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
-    return WithInterval(form.format(q.value) + unit, _interval(q, form))
+    return WithInterval(form.format(printed(q)) + unit, _interval(q, form))
 
 
 def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, WithInterval]]:

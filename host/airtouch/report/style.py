@@ -57,14 +57,14 @@ def png(figure: Figure, dots_per_inch: float = 120) -> bytes:
 
 
 def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e-9) -> None:
-    """Set the y limits from the middle 99 % of the values, so that a hard landing does not set the scale.
+    """Set the y limits to hold the middle 99 % of each of the values, so that a hard landing does not set the scale.
 
     margin: above and below, as a fraction of that range. least: range of values that hardly differ. Values that are not
     finite do not count.
     """
-    joined = np.concatenate([np.ravel(v) for v in values])
-    joined = joined[np.isfinite(joined)]
-    if len(joined):
-        low, high = np.percentile(joined, [0.5, 99.5])
+    finite = [v[np.isfinite(v)] for v in values]
+    ends = [np.percentile(v, [0.5, 99.5]) for v in finite if len(v)]
+    if ends:
+        low, high = np.min(ends), np.max(ends)
         pad = margin * max(high - low, least)
         ax.set_ylim(low - pad, high + pad)

@@ -4,14 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.answer.pictures import MOST_SPECTRA, pictures_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.nominal.build_study import sensor_noise
 from airtouch.gap.result import NamedEffect, Quantity
-from airtouch.gap.signals.channels import COLUMN, angular_acceleration
+from airtouch.gap.signals.channels import COLUMN, COUNT, angular_acceleration
 from airtouch.gap.signals.spectra import AIR, frequencies
 from airtouch.gap.signatures.candidates import term_of, terms
+from airtouch.gap.study import Study
+from airtouch.gap.where.gap_map import gap_map
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 from gap_flights import VEHICLE, flight, noise
 from hovers import FLOOR, LOUDNESS, hover
@@ -21,22 +25,43 @@ SECONDS = 15.0
 TIME_S = np.arange(round(SECONDS / PERIOD_S)) * PERIOD_S
 FORWARD = np.array([0.5, 0.0, 0.0])  #: m/s^2
 LOWEST = cell("force_x", "hover", 0.5)
+LOW = (LOWEST, replace(LOWEST, band_hz=(0.5, 2.0)))
 
 
 def bias(mps2):
     return term_of(NamedEffect("imu_bias", {"acc_x": Quantity(mps2)}))
 
 
-def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR):
-    return pictures_of(study, flights, nominal, effects, cells)
+def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR, whole_map=LOW):
+    return pictures_of(study, flights, nominal, effects, cells, whole_map)
 
 
 def test_signal_is_that_of_the_cell():
     drawn = pictures(flight(SECONDS, FORWARD, name="pushed.csv")).signal
     assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
-    assert drawn.floor == LOWEST.floor
     np.testing.assert_allclose(drawn.time_s, TIME_S)
     assert drawn.phase.shape == TIME_S.shape and drawn.after is None
+
+
+def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phase_by_phase():
+    """3, 4 and 5; that of another channel, of a higher band and of a regime does not count, nor does half a floor."""
+    low, second, third = (0.0, 0.5), (0.5, 2.0), (2.0, 6.0)
+    floors = [("hover", low, 0.3), ("hover", second, 0.4), ("hover", third, 7.0), ("take-off", low, 0.6),
+              ("take-off", second, 0.8), ("landing", low, 0.1)]
+    whole_map = [*(cell("force_x", phase, 0.5, floor, band_hz=band) for phase, band, floor in floors),
+                 cell("force_y", "hover", 0.5, 9.0), cell("force_x", "hover", 0.5, 9.0, regime="low")]
+    phase = np.repeat([KINDS.index(k) for k in ("take-off", "hover", "landing")], len(TIME_S) // 3)
+    drawn = pictures(flight(SECONDS, FORWARD, phase=phase), whole_map=whole_map).signal
+    np.testing.assert_allclose(drawn.floor, np.repeat([1.0, 0.5, np.nan], len(TIME_S) // 3))
+
+
+@pytest.mark.parametrize("band_hz", [(0.0, 0.5), (2.0, 6.0), (25.0, 50.0)])
+def test_two_thirds_of_white_noise_at_its_floor_lie_within_the_floor(band_hz):
+    """As of any normal variable within one standard deviation: 68 %."""
+    flown = [flight(60.0, noise(60.0, 1.0, i) * [1.0, 0.0, 0.0], name=str(i)) for i in range(6)]
+    drawn = pictures(flown[0], cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)],
+                     whole_map=gap_map(FLOOR, flown[:1], flown[1:]).cells).signal
+    assert np.mean(np.abs(drawn.before) < drawn.floor) == pytest.approx(0.683, abs=0.06)
 
 
 def test_measured_is_the_model_and_the_gap_together():
@@ -52,21 +77,30 @@ def test_the_gap_after_is_without_what_the_effects_make():
     np.testing.assert_allclose(drawn.after, 0.1, atol=1e-9)
 
 
-@pytest.mark.parametrize(("band_hz", "push_hz", "highest_hz"), [
-    ((0.0, 0.5), 1.0, 2.0), ((0.0, 0.5), 4.0, 2.0), ((0.5, 2.0), 1.0, 2.0), ((0.5, 2.0), 4.0, 2.0),
-    ((2.0, 6.0), 4.0, 6.0), ((2.0, 6.0), 9.0, 6.0), ((6.0, 12.0), 4.0, 12.0), ((25.0, 50.0), 40.0, 50.0),
-    ((2.0, 6.0), 2.0, 6.0), ((6.0, 12.0), 6.0, 12.0), ((0.0, 0.5), 0.5, 2.0)])  # at a crossover inside
-def test_signal_holds_what_is_below_the_frequency_that_it_states(band_hz, push_hz, highest_hz):
+@pytest.mark.parametrize(("band_hz", "push_hz", "drawn_hz"), [
+    ((0.0, 0.5), 1.0, (0.0, 2.0)), ((0.0, 0.5), 4.0, (0.0, 2.0)), ((0.5, 2.0), 1.0, (0.0, 2.0)),
+    ((0.5, 2.0), 4.0, (0.0, 2.0)), ((2.0, 6.0), 4.0, (2.0, 6.0)), ((2.0, 6.0), 9.0, (2.0, 6.0)),
+    ((6.0, 12.0), 4.0, (6.0, 12.0)), ((25.0, 50.0), 40.0, (25.0, 50.0)),
+    ((0.0, 0.5), 0.5, (0.0, 2.0))])  # at a crossover inside
+def test_signal_holds_what_is_in_the_band_that_it_states(band_hz, push_hz, drawn_hz):
     """A push beside a constant one, away from the ends, where the filter lacks one side.
 
-    It is drawn up to the end of the cell's band, and up to 2 Hz at least.
+    It is drawn in the cell's band, and up to 2 Hz where that lies below.
     """
-    push, share = np.sin(2.0 * np.pi * push_hz * TIME_S), push_hz < highest_hz
+    push, share = np.sin(2.0 * np.pi * push_hz * TIME_S), drawn_hz[0] < push_hz < drawn_hz[1]
     pushed_flight = flight(SECONDS, push[:, None] * [1.0, 0.0, 0.0] + FORWARD)
     drawn = pictures(pushed_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
     inside = slice(300, -300)
-    assert drawn.highest_hz == highest_hz
-    np.testing.assert_allclose(drawn.before[inside], 0.5 + share * push[inside], atol=0.05)
+    assert drawn.band_hz == drawn_hz
+    np.testing.assert_allclose(drawn.before[inside], 0.5 * (drawn_hz[0] == 0.0) + share * push[inside], atol=0.05)
+
+
+@pytest.mark.parametrize(("channel", "band_hz"), [("rate_x", (0.0, 0.5)), ("force_x", (0.5, 2.0))])
+def test_signal_keeps_to_its_own_band_where_the_map_lacks_another_below_2_hz(channel, band_hz):
+    """As of rates, whose lowest band alone is judged, and of commands, whose lowest is not: the floor is known."""
+    own = cell(channel, "hover", 0.5, 0.2, band_hz=band_hz)
+    drawn = pictures(flight(SECONDS), cells=[own], whole_map=[own]).signal
+    assert drawn.band_hz == band_hz and (drawn.floor == 0.2).all()
 
 
 def test_height_is_drawn_beside_a_ground_effect_alone_and_where_it_is_known():
@@ -85,17 +119,18 @@ def test_nothing_is_drawn_where_nothing_is_judged():
     assert whole_flight.usable.all()
     np.testing.assert_array_equal(np.isfinite(drawn.signal.before), used)
     np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
+    np.testing.assert_array_equal(np.isfinite(drawn.signal.floor), used)
 
 
-@pytest.mark.parametrize("band_hz", [(0.0, 0.5), (25.0, 50.0)])
-def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz):
+@pytest.mark.parametrize(("band_hz", "constant"), [((0.0, 0.5), 0.5), ((25.0, 50.0), 0.0)])
+def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz, constant):
     """A constant gap, with 50 m/s^2 in the rows that stand for those that were lost."""
     lost = (TIME_S >= 7.0) & (TIME_S < 7.1)
     lossy_flight = flight(SECONDS, np.where(lost[:, None], 50.0, FORWARD), lost=lost)
     drawn = pictures(lossy_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
     for curve in (drawn.before, drawn.measured):
         assert np.isnan(curve[lost]).all()
-        np.testing.assert_allclose(curve[~lost], 0.5, atol=1e-9)
+        np.testing.assert_allclose(curve[~lost], constant, atol=1e-9)
 
 
 def test_flight_of_the_signal_is_that_of_the_median_gap():
@@ -125,8 +160,9 @@ def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):
     drawn = pictures(turning_flight, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
     assert (drawn.measured is not None) is shown
     if shown:
-        pitch = angular_acceleration(turning_flight)[:, 1]
-        assert np.corrcoef(drawn.measured[100:-100], pitch[100:-100])[0, 1] > 0.5
+        band = butter(4, (12.0, 25.0), "bandpass", fs=1.0 / PERIOD_S, output="sos")
+        pitch = sosfiltfilt(band, angular_acceleration(turning_flight)[:, 1])
+        assert np.corrcoef(drawn.measured[100:-100], pitch[100:-100])[0, 1] > 0.95
 
 
 def test_spectra_are_of_the_cells_channels_each_once_and_the_first_few():
@@ -155,6 +191,14 @@ def test_floor_of_a_spectrum_is_measured_where_nine_blocks_are_known_and_the_sen
     np.testing.assert_allclose(spectrum.floor[1:-1], rise * declared, rtol=1e-6)
 
 
+def test_a_command_has_no_floor_where_no_nominal_flights_give_one(monkeypatch):
+    """The noise of the sensors, which stands for them, is not in a command."""
+    monkeypatch.setattr(Study, "residual", lambda *_: np.random.default_rng(0).normal(size=(len(TIME_S), COUNT)))
+    force, command = pictures(hover(1, length_s=SECONDS),
+                              cells=[cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]).spectra
+    assert force.floor is not None and command.channel == "command_yaw" and command.floor is None
+
+
 def test_spectrum_after_lacks_the_power_of_a_mean_effect():
     (spectrum,) = pictures(flight(SECONDS, FORWARD), effects=[bias(0.5)]).spectra
     assert spectrum.before[0] > 0.1 and spectrum.after.max() < 1e-9
@@ -165,11 +209,13 @@ def test_spectrum_after_a_random_effect_is_near_the_floor():
     louder = terms("imu_noise")[0].fitted(np.ones(1))
     factor = louder.values["factor"]
     noisy_flight = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
-    (spectrum,) = pictures(noisy_flight, effects=[louder]).spectra
+    curves = pictures(noisy_flight, effects=[louder])
+    (spectrum,) = curves.spectra
     above = slice(2, -1)
     assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
     off = np.abs(spectrum.after - spectrum.floor)[above].mean()
     assert off < 0.3 * (spectrum.before - spectrum.floor)[above].mean()
+    assert curves.random and not pictures(noisy_flight, effects=[bias(0.4)]).random
 
 
 def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():

@@ -55,6 +55,16 @@ def test_names_are_joined_as_a_list(names, text):
     assert words.joined(names) == text
 
 
+def test_a_shrink_of_nearly_nothing_has_no_sign():
+    assert words.quantity(Quantity(-0.001, -0.012, -0.0001), words.SHRINK_FORM) == "0.00 (-0.01 to 0.00)"
+
+
+def test_a_rounding_error_is_nothing():
+    assert words.quantity(Quantity(7.14e-18, -0.0329, 0.0329, "rad/s")) == "0 rad/s (-0.0329 to 0.0329)"
+    assert words.quantity(Quantity(-0.000354, -0.0073, 0.00659)) == "-0.000354 (-0.0073 to 0.00659)"
+    assert words.quantity(Quantity(1e-9)) == "1e-09"
+
+
 def test_interval_has_enough_digits():
     assert words.quantity(Quantity(0.1203, 0.12028, 0.12034)) == "0.1203 (0.12028 to 0.12034)"
     assert words.quantity(Quantity(0.12, 0.09, 0.13)) == "0.12 (0.09 to 0.13)"

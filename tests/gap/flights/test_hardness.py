@@ -72,7 +72,7 @@ def test_a_flight_flown_unlike_its_baseline_is_said_so():
                     1.5, hardness_of(Rolling(np.radians(15.0)), FIRST, 256).max())
     study = SimpleNamespace(floor=SimpleNamespace(slopes=slopes))
     for name, flight in (calm, hard, nominal):
-        flight.name = name
+        flight.file_name = name
         notes = flown_unlike(study, [flight])
         assert bool(notes) == (name != "usual")
         assert name == "usual" or {"calm": "calmer", "hard": "harder"}[name] in notes[0]

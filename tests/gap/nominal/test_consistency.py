@@ -70,9 +70,9 @@ def test_one_odd_flight_of_many_leaves_the_others_of_one_trim():
 @pytest.mark.parametrize(("offset", "told"), [((0.0, 0.0, 0.5), "lift +0.5"),
                                               ((0.0, -0.9, 0.5), "sideways force -0.9")])
 def test_the_note_tells_the_channel_that_is_farthest_off(offset, told):
-    odd = flight(1.0, np.tile(offset, (100, 1)), name="odd")
+    odd = flight(1.0, np.tile(offset, (100, 1)), name="logs/odd.csv")
     (note,) = split_unlike(VEHICLE, [*baseline(0.0, 0.0, 0.0), odd], FAR)[1]
-    assert note == f"odd: declared nominal, yet unlike the others ({told} m/s^2); left out"
+    assert note == f"odd.csv: declared nominal, yet unlike the others ({told} m/s^2); left out"
 
 
 def test_two_flights_cannot_say_which_is_unlike():

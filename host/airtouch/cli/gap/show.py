@@ -12,7 +12,7 @@ from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Diagnosis
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.cell_words import interval, short
+from airtouch.gap.where.cell_words import gap, interval, short
 from airtouch.gap.where.summary import significant
 
 MOST_CELLS = 16  #: rows of a table of cells, largest first; no source: fits a terminal
@@ -22,7 +22,7 @@ CELL_COLUMNS: dict[str, tuple[Callable[[Cell], str], int]] = {
     "regime": (lambda c: "" if c.regime == "all" else c.regime, 0),
     "channel": (lambda c: CHANNEL_WORDS[c.channel], 0),
     "band, Hz": (lambda c: f"{c.band_hz[0]:g}-{c.band_hz[1]:g}", 0),
-    "gap": (lambda c: short(c.gap), 0),
+    "gap": (gap, 0),
     "interval": (interval, 125),
     "unit": (lambda c: c.unit, 100),
     "floor": (lambda c: short(c.floor), 100),
@@ -79,7 +79,8 @@ def diagnosis(screen: Console, result: Diagnosis) -> None:
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)
     for r in words.leading(result.ranking):
-        table.add_row(r.name, f"{r.probability:.1%}", words.quantity(r.shrink, "{:.2f}") if r.measured else "-", r.why)
+        shrink = words.quantity(r.shrink, words.SHRINK_FORM) if r.measured else "-"
+        table.add_row(r.name, f"{r.probability:.1%}", shrink, r.why)
     screen.print(table)
     for group in result.indistinguishable:
         screen.print(f"cannot be told apart here: {', '.join(group)}")

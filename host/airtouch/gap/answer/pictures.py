@@ -19,7 +19,8 @@ from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import stretches
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.command_power import MeanSpectra, command_power, mean_spectra
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, low_passed
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, band_passed
+from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
 GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
@@ -44,35 +45,39 @@ class FlightResidual:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel of one flight up to a frequency; curves (n,), NaN where nothing is judged.
+    """One channel of one flight in a band of frequencies; curves (n,), NaN where nothing is judged.
 
     measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
-    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: of the headline's cell;
-    height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known.
+    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: rms of the floor in
+    that band and the sample's phase, NaN where the map does not have it; height_m: of the rotors over the ground
+    below, None where no effect of the ground is named or it is not known.
     """
 
     flight: str
     channel: str
-    highest_hz: float
+    band_hz: tuple[float, float]
     unit: str
     time_s: np.ndarray
     phase: np.ndarray
     measured: np.ndarray | None
     before: np.ndarray
     after: np.ndarray | None
-    floor: float
+    floor: np.ndarray
     height_m: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`."""
+    """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`.
+
+    floor: None where nothing is known of it, as of a command without enough nominal flights.
+    """
 
     channel: str
     unit: str
     before: np.ndarray
     after: np.ndarray | None
-    floor: np.ndarray
+    floor: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -80,21 +85,23 @@ class Pictures:
     """Every curve of a report.
 
     signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
-    spectra; commands: None where no flight has a steady stretch.
+    spectra; commands: None where no flight has a steady stretch; random: whether an effect that acts at random is
+    among those named.
     """
 
     signal: Signal | None = None
     frequency_hz: np.ndarray = field(default_factory=lambda: np.zeros(0))
     spectra: tuple[Spectrum, ...] = ()
     commands: MeanSpectra | None = None
+    random: bool = False
 
 
 def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-                cells: Sequence[Cell]) -> Pictures:
+                cells: Sequence[Cell], whole_map: Sequence[Cell]) -> Pictures:
     """The curves of a diagnosis.
 
     cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
-    without any, the commands are all.
+    without any, the commands are all. whole_map: every cell of the map, whose floors are drawn.
     """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
     if not cells or not flights:
@@ -104,21 +111,45 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     median = _median_residual(residuals, cells[0].channel)
-    signal = None if median is None else _signal(median, cells[0])
+    signal = None if median is None else _signal(median, cells[0], whole_map)
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
-                    _spectra(study, residuals, effects, channels), commands)
+                    _spectra(study, residuals, effects, channels), commands, bool(random_of(effects)))
 
 
-def _signal(residual: FlightResidual, cell: Cell) -> Signal:
-    """The curves of one flight in a cell's channel, up to the end of its band or to LEAST_CUTOFF_HZ."""
-    flight, c = residual.flight, COLUMN[cell.channel]
-    highest_hz = max(cell.band_hz[1] if cell.band_hz in MAP_BANDS_HZ else 0.0, LEAST_CUTOFF_HZ)
-    measured, after = (None if values is None else _lowpass(flight, values, highest_hz)
+def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
+    """The curves of one flight in a cell's channel and band (`_band`)."""
+    flight, c, band_hz = residual.flight, COLUMN[cell.channel], _band(cell, whole_map)
+    measured, after = (None if values is None else _band_passed(flight, values, band_hz)
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
-    return Signal(flight.name, cell.channel, highest_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, measured, _lowpass(flight, residual.before[:, c], highest_hz), after, cell.floor)
+    before = _band_passed(flight, residual.before[:, c], band_hz)
+    floor = np.where(np.isfinite(before), _floors(cell.channel, band_hz, whole_map)[flight.phase], np.nan)
+    return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
+                  flight.phase, measured, before, after, floor)
+
+
+def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
+    """Band in which a cell's signal is drawn, Hz: its own; up to LEAST_CUTOFF_HZ where it and the map's others are."""
+    low = [band for band in MAP_BANDS_HZ if band[1] <= LEAST_CUTOFF_HZ]
+    in_map = {c.band_hz for c in whole_map if c.channel == cell.channel}
+    own = cell.band_hz in MAP_BANDS_HZ and not (cell.band_hz in low and in_map.issuperset(low))
+    return cell.band_hz if own else (0.0, LEAST_CUTOFF_HZ)
+
+
+def _within(band_hz: tuple[float, float]) -> list[int]:
+    """Places in MAP_BANDS_HZ of the bands that lie within a wider one."""
+    return [i for i, (low, high) in enumerate(MAP_BANDS_HZ) if band_hz[0] <= low and high <= band_hz[1]]
+
+
+def _floors(channel: str, band_hz: tuple[float, float], whole_map: Sequence[Cell]) -> np.ndarray:
+    """Rms (len(KINDS),) of a channel's floor in a band in each phase; NaN where the map lacks a part of it.
+
+    The mean squares of the map's bands add up, as their gains are power-complementary (`filter_bank`).
+    """
+    of_cell = {(c.phase, c.band_hz): c.floor for c in whole_map if c.channel == channel and c.regime == "all"}
+    parts = [MAP_BANDS_HZ[i] for i in _within(band_hz)]
+    return np.sqrt([sum(of_cell.get((kind, part), np.nan) ** 2 for part in parts) for kind in KINDS])
 
 
 def _height(flight: Flight) -> np.ndarray | None:
@@ -148,15 +179,13 @@ def _measured(flight: Flight, channel: int) -> np.ndarray | None:
     return None
 
 
-def _lowpass(flight: Flight, values: np.ndarray, highest_hz: float) -> np.ndarray:
-    """Values (n,) in the bands that end at a frequency or below it, NaN where nothing is judged."""
-    out, bands = np.full(len(values), np.nan), sum(end <= highest_hz for _, end in MAP_BANDS_HZ)
+def _band_passed(flight: Flight, values: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
+    """Values (n,) in a band, NaN where nothing is judged."""
+    out = np.full(len(values), np.nan)
     for start, stop in stretches(flight):
         valid = ~flight.bridged[start:stop]
         here = interpolate_over(values[start:stop, None], valid)
-        if bands < len(MAP_BANDS_HZ):
-            here = low_passed(here, bands)
-        out[start:stop] = np.where(valid, here[:, 0], np.nan)
+        out[start:stop] = np.where(valid, band_passed(here, _within(band_hz))[:, 0], np.nan)
     return out
 
 
@@ -170,7 +199,8 @@ def _spectra(study: Study, residuals: Sequence[FlightResidual], effects: Sequenc
                        sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
     before = _mean_of_known([_power(r.flight, r.before) for r in airborne])
     after = _power_after(study, airborne, effects, floor) if effects else None
-    return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c], floor[:, c])
+    return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c],
+                          floor[:, c] if (floor[1:, c] > LEAST_FLOOR_POWER).any() else None)
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
 
 

@@ -101,7 +101,7 @@ def _how_far(diagnosis: Diagnosis) -> str:
         return f"Nothing closes it yet: the gap over all cells stays {short(before)} times the floor."
     added, they = ("it", "it was") if len(diagnosis.effects) == 1 else ("them", "they were")
     data = f"that {they} fitted to" if diagnosis.judged_on == FITTED else "held out"
-    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:.0%}')} of the gap above the "
+    return (f"Adding {added} to the simulator takes away {quantity(diagnosis.shrink, '{:z.0%}')} of the gap above the "
             f"floor on data {data}, from {short(before)} to {short(after)} times the floor"
             f"{_cells_in_words(diagnosis.map.cells if diagnosis.map else diagnosis.where)}."
             f"{_why_cells_stay(diagnosis)}")

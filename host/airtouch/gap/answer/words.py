@@ -9,6 +9,8 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import band_in_words
 
 MOST_RANKED = 10  #: candidates of a ranking that are shown; chosen. A larger number makes a longer table
+SHRINK_FORM = "{:z.2f}"  #: format of a shrink; z: 0.00, not -0.00
+VANISHING = 1e-6  #: of the larger end of its interval, below which a value is 0: rounding errors; chosen
 DECIMALS = 1  #: of the seconds and ratios of an open cell that are shown
 
 
@@ -25,7 +27,13 @@ def quantity(q: Quantity, form: str | None = None) -> str:
     form = form or format_of(q)
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
     interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
-    return form.format(q.value) + unit + interval
+    return form.format(printed(q)) + unit + interval
+
+
+def printed(q: Quantity) -> float:
+    """The value, and 0 where it is so small beside the ends of its interval that its digits mean nothing."""
+    ends = max((abs(end) for end in (q.low, q.high) if end is not None), default=0.0)
+    return 0.0 if abs(q.value) < VANISHING * ends else q.value
 
 
 def joined(names: list[str]) -> str:

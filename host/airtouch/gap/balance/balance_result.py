@@ -97,7 +97,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [], [headline, *cells] if headline else [])
+        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [],
+                             [headline, *cells] if headline else [], cells)
         if pictures else None)
     return replace(answer, next=next_steps(answer, flights, vehicle, own_effects=False))
 

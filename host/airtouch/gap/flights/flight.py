@@ -72,6 +72,11 @@ class Flight:
         return len(self.pwm)
 
     @property
+    def file_name(self) -> str:
+        """Its name without the folders of its file."""
+        return Path(self.name).name
+
+    @property
     def has_gyro(self) -> bool:
         """Whether its rates are logged."""
         return self.rates is not None

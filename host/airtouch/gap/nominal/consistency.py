@@ -52,7 +52,7 @@ def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -
     unlike = (np.abs(distance) > 1.0).any(axis=1)
     if unlike.sum() > len(flights) // MOST_LEFT_OUT:
         return list(flights), []
-    notes = [f"{f.name}: declared nominal, yet unlike the others ({_farthest(t - median, d)}); left out"
+    notes = [f"{f.file_name}: declared nominal, yet unlike the others ({_farthest(t - median, d)}); left out"
              for f, t, d, out in zip(flights, trim, distance, unlike, strict=True) if out]
     return [f for f, out in zip(flights, unlike, strict=True) if not out], notes
 
@@ -92,7 +92,8 @@ def odd_flights(study: Study, flights: Sequence[Flight]) -> list[str]:
         offset = trim[i] - others.mean(axis=0)
         distance = np.abs(offset) / np.maximum(error, least)
         if distance.max() > limit:
-            notes.append(f"{f.name}: declared nominal, yet far from the others' mean ({_farthest(offset, distance)})")
+            notes.append(f"{f.file_name}: declared nominal, yet far from the others' mean "
+                         f"({_farthest(offset, distance)})")
     return notes
 
 
@@ -130,16 +131,16 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
         word, end, limit = (("harder", slopes.hardest, "at most") if middle > slopes.hardest
                             else ("calmer", slopes.calmest, "at least"))
         own, theirs = (tilt_degrees(x) for x in (middle, end))
-        notes.append(f"{f.name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, theirs "
-                     f"by {limit} {theirs:.1f}): the floor is extrapolated; fly the baseline like the test")
+        notes.append(f"{f.file_name}: flown {word} than any baseline flight (its tilt varies by {own:.1f} degrees, "
+                     f"theirs by {limit} {theirs:.1f}): the floor is extrapolated; fly the baseline like the test")
     return notes
 
 
 def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list[str]:
     """A note on each flight whose log is of another kind than every baseline log."""
     kinds = {log_kind(f.log) for f in baseline}
-    return [f"{f.name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({', '.join(sorted(kinds))}): "
-            "what differs may be the logs; take a baseline that was logged like the test"
+    return [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's "
+            f"({', '.join(sorted(kinds))}): what differs may be the logs; take a baseline that was logged like the test"
             for f in flights if kinds and log_kind(f.log) not in kinds]
 
 

@@ -10,6 +10,7 @@ from airtouch.gap.where.cell import Cell
 #: each phase as a phrase
 PHASE_WORDS = {"ground": "on the ground", "take-off": "at take-off", "hover": "in hover",
                "cruise": "in cruise", "over platform": "over the platform", "landing": "at landing"}
+MOST_DIGITS = 5  #: of a gap with an interval; chosen, as many as are read at a glance
 
 
 def in_words(cell: Cell) -> str:
@@ -28,14 +29,31 @@ def band_in_words(cell: Cell | OpenCell) -> str:
     return f"{cell.band_hz[0]:g}-{cell.band_hz[1]:g} Hz"
 
 
+def gap(cell: Cell) -> str:
+    """The cell's gap, with as many digits as its interval."""
+    return short(cell.gap, _digits(cell))
+
+
 def interval(cell: Cell) -> str:
-    """The interval of the cell's gap, "" where there is none."""
-    return "" if cell.low is None or cell.high is None else f"{short(cell.low)} to {short(cell.high)}"
+    """The interval of the cell's gap, with enough digits that its ends differ; "" where there is none."""
+    if cell.low is None or cell.high is None:
+        return ""
+    digits = _digits(cell)
+    return f"{short(cell.low, digits)} to {short(cell.high, digits)}"
 
 
-def short(value: float) -> str:
-    """The value with two digits, or its whole part where that has more."""
-    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
+def _digits(cell: Cell) -> int:
+    """Least digits, two to MOST_DIGITS, with which the ends of the interval of the cell's gap differ; else two."""
+    if cell.low is None or cell.high is None:
+        return 2
+    return next((n for n in range(2, MOST_DIGITS + 1) if short(cell.low, n) != short(cell.high, n)), 2)
+
+
+def short(value: float, digits: int = 2) -> str:
+    """The value with so many digits, or its whole part where that has more; with more than two, final zeros too."""
+    if abs(value) >= 10.0 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:.{digits}g}" if digits == 2 else f"{value:#.{digits}g}"
 
 
 def change_in_words(cell: Cell) -> str:

@@ -4,6 +4,8 @@ Neighbours cross over by a raised cosine, so that the bands' mean squares add up
 mirrored at its ends, so that one of half a second has a value in every band.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from airtouch.gap.flights.flight import PERIOD_S
@@ -34,9 +36,9 @@ def filtered(values: np.ndarray) -> np.ndarray:
     return _with_gains(values, gains(_mirrored_frequencies(len(values))))
 
 
-def low_passed(values: np.ndarray, bands: int) -> np.ndarray:
-    """Values (n, c) of one stretch in the lowest bands together, with a gain of 1 up to the crossover of the last."""
-    power_gain = (gains(_mirrored_frequencies(len(values)))[:bands] ** 2).sum(axis=0)
+def band_passed(values: np.ndarray, bands: Sequence[int]) -> np.ndarray:
+    """Values (n, c) of one stretch in several bands together, with a gain of 1 at a crossover between two of them."""
+    power_gain = (gains(_mirrored_frequencies(len(values)))[list(bands)] ** 2).sum(axis=0)
     return _with_gains(values, np.sqrt(power_gain)[None])[0]
 
 
