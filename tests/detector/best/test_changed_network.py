@@ -9,12 +9,13 @@ from click.testing import CliRunner
 from airtouch import logs
 from airtouch.cli.learning import train
 from airtouch.detector import best
-from airtouch.detector.best import batches, export, fit_settings, model, network, outputs, recipe, training
+from airtouch.detector.best import batches, export, fit_settings, model, network, operations, outputs, recipe, training
 from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
+from airtouch.reference.networks.int8_network import LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
 from skips import needs
@@ -60,6 +61,20 @@ def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path, monkeypat
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
     assert again.c_sources() and CHANNELS == again.int8.layers[0].weights.shape[1] // SMALL.first_taps
+
+
+@needs("tensorflow")
+@pytest.mark.parametrize("of_layer2, message", [
+    ({"reads": (0, 1)}, "convolutions in a row"), ({"operation": "unknown to C"}, r"layer 2 .* `make setup`")])
+def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_first_step(monkeypatch, of_layer2, message):
+    """A graph of another form, and an arithmetic that the C library was built without."""
+    graph = tuple(replace(layer, **of_layer2) if layer.name == "layer2" else layer for layer in SMALL.graph)
+    without_c = replace(operations.OPERATIONS[CAUSAL_CONV], kind=LayerKind("new", 99, lambda layer, x: x))
+    monkeypatch.setitem(operations.OPERATIONS, "unknown to C", without_c)
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: graph))
+    monkeypatch.setattr(training, "fit", lambda *_, **__: pytest.fail("the training began"))
+    with pytest.raises(AirTouchError, match=message):
+        best.fit([made_flight()], recipe=SMALL)
 
 
 @pytest.mark.parametrize("change, message", [
