@@ -15,6 +15,7 @@ from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
+from airtouch.reference.motion_channels import NAMES
 from airtouch.reference.networks.int8_network import LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
@@ -61,6 +62,21 @@ def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path, monkeypat
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
     assert again.c_sources() and CHANNELS == again.int8.layers[0].weights.shape[1] // SMALL.first_taps
+
+
+def test_a_model_of_other_channels_is_refused_though_its_shape_is_the_same(monkeypatch, tmp_path):
+    """As after the page's change of channels: one in the place of the empty one."""
+    shipped = best.load(None)
+    monkeypatch.setattr(model, "NAMES", (*NAMES[:-1], "pressure"))
+    model._shipped.cache_clear()
+    with pytest.raises(AirTouchError, match=r"other motion channels than ax, .*, pressure"):
+        best.load(None)
+    replace(shipped, spares={}).save(tmp_path / "own.npz")
+    assert best.load(tmp_path / "own.npz").metadata == shipped.metadata
+    monkeypatch.undo()
+    model._shipped.cache_clear()
+    with pytest.raises(AirTouchError, match="own.npz: a model of other motion channels"):
+        best.load(tmp_path / "own.npz")
 
 
 @needs("tensorflow")
