@@ -61,7 +61,8 @@ def test_a_check_as_json_holds_rate_edges_and_files_left_out(folder):
 def test_every_command_takes_the_same_files_of_a_folder_for_flights(tmp_path, capsys):
     """`evaluate` once saw no flight in a folder of ULog files, and `logs info` passed over uSD logs."""
     taken = ["A.CSV", "a.ulg", "b.usd", "c.bin", "d.csv", "e.csv.gz", "f.parquet", "log00", "log01", "log02"]
-    for name in (*taken, "manifest.csv", "notes.txt", "map.geojson", "LICENSE", "blank"):
+    beside = ("manifest.csv", "run.json", "diverged.jsonl")  # that AirTouch itself puts there
+    for name in (*taken, *beside, "notes.txt", "map.geojson", "LICENSE", "blank"):
         (tmp_path / name).write_text("file\n" if name != "blank" else "")
     (tmp_path / "log00").write_bytes(b"\xbc\x02")  # Bitcraze's card writes no ending
     (tmp_path / "log01").write_bytes(b"\x02tick(I),acc.x(f),")  # firmware of 2019

@@ -22,6 +22,7 @@ ENDINGS = (".csv", ".csv.gz", ".parquet", ".usd", ".bin", ".ulg")  #: of the fil
 STREAMS = ("/dev/null", "/dev/stdout")  #: that are written to as they are
 PARQUET = b"PAR1"  #: first bytes of a Parquet file
 MANIFEST = "manifest.csv"  #: of a folder: one row a flight, with the condition in which it was flown
+REQUEST, FAILED = "run.json", "diverged.jsonl"  #: of a folder of simulated flights (`simulation.workers.store`)
 
 
 def read(path: str | Path) -> FlightLog:
@@ -95,8 +96,9 @@ def flights_in(folder: Path) -> list[Path]:
 
 
 def ignored(folder: Path) -> int:
-    """Number of files in a folder that are no flight logs; its manifest and hidden files do not count."""
-    return sum(not _is_flight(p) for p in _files_of(folder) if p.name != MANIFEST and not p.name.startswith("."))
+    """Number of files in a folder that are no flight logs, without hidden ones and those that AirTouch puts beside."""
+    return sum(not _is_flight(p) for p in _files_of(folder)
+               if p.name not in (MANIFEST, REQUEST, FAILED) and not p.name.startswith("."))
 
 
 def _files_of(folder: Path, below: bool = False) -> list[Path]:

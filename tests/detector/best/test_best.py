@@ -39,6 +39,11 @@ def test_what_is_compiled_is_known_by_all_that_it_reads():
     assert attributes - {"graph"} == set(training.COMPILED)
 
 
+def test_the_small_network_of_the_tests_has_every_operation_of_the_shipped_graph():
+    """Else an operation of a layer that SMALL lacks would be trained, quantised and compared nowhere."""
+    assert {layer.operation for layer in SMALL.graph} == {layer.operation for layer in Recipe().graph}
+
+
 def test_pruned_blocks_are_whole_and_exact(small):
     pruned = [i for i, layer in enumerate(SMALL.graph) if layer.pruned]
     assert len(pruned) >= 2

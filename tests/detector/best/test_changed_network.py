@@ -4,14 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from airtouch import logs
+from airtouch.cli.learning import train
 from airtouch.detector import best
-from airtouch.detector.best import batches, export, model, network, outputs, recipe, training
+from airtouch.detector.best import batches, export, fit_settings, model, network, operations, outputs, recipe, training
 from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
+from airtouch.reference.motion_channels import NAMES
+from airtouch.reference.networks.int8_network import LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
 from skips import needs
@@ -40,18 +45,50 @@ def changed(monkeypatch):
 
 @needs("tensorflow")
 @pytest.mark.usefixtures("changed")
-def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path):
+def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path, monkeypatch):
+    """By the page's own command on recorded flights; the shipped models no longer fit and have no part in it."""
     log = made_flight(2)
-    trained = best.fit([made_flight(0), made_flight(1)], seed=3, recipe=replace(SMALL, steps=3))
-    assert trained.int8.layers[-1].weights.shape[0] == len(outputs.OUTPUTS)
-    assert trained.int8.layers[2].weights.shape == (SMALL.width, SMALL.width)
-    trained.save(tmp_path / "mine.npz")
+    (tmp_path / "flights").mkdir()
+    for i in range(2):
+        logs.write(made_flight(i), tmp_path / "flights" / f"{i}.csv")
+    monkeypatch.setattr(fit_settings, "Recipe", lambda: replace(SMALL, steps=3))
+    told = CliRunner().invoke(train.command, [str(tmp_path / "flights"), "--out", str(tmp_path / "mine.npz")])
+    assert told.exit_code == 0, told.output + str(told.exception)
     again = best.load(tmp_path / "mine.npz")
+    assert again.int8.layers[-1].weights.shape[0] == len(outputs.OUTPUTS)
+    assert again.int8.layers[2].weights.shape == (SMALL.width, SMALL.width)
     assert best.run_float(log, again).signals["logits"].shape == (len(log), len(outputs.OUTPUTS))
     assert best.run(log, again).note == ""
     without = best.run(sensors.without(log, ("acceleration",)), again)
     assert without.note == "no acceleration in this log"  # without the figures of the shipped model
-    assert again.c_sources() and CHANNELS == trained.int8.layers[0].weights.shape[1] // SMALL.first_taps
+    assert again.c_sources() and CHANNELS == again.int8.layers[0].weights.shape[1] // SMALL.first_taps
+
+
+def test_a_model_of_other_channels_is_refused_though_its_shape_is_the_same(small, monkeypatch, tmp_path):
+    """As after the page's change of channels: one in the place of the empty one."""
+    small.save(tmp_path / "old.npz")
+    monkeypatch.setattr(model, "NAMES", (*NAMES[:-1], "pressure"))
+    with pytest.raises(AirTouchError, match=r"old.npz: a model of other motion channels than ax, .*, pressure"):
+        best.load(tmp_path / "old.npz")
+    small.save(tmp_path / "own.npz")
+    assert best.load(tmp_path / "own.npz").metadata == small.metadata
+    monkeypatch.undo()
+    with pytest.raises(AirTouchError, match="own.npz: a model of other motion channels"):
+        best.load(tmp_path / "own.npz")
+
+
+@needs("tensorflow")
+@pytest.mark.parametrize("of_layer2, message", [
+    ({"reads": (0, 1)}, "convolutions in a row"), ({"operation": "unknown to C"}, r"layer 2 .* `make setup`")])
+def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_first_step(monkeypatch, of_layer2, message):
+    """A graph of another form, and an arithmetic that the C library was built without."""
+    graph = tuple(replace(layer, **of_layer2) if layer.name == "layer2" else layer for layer in SMALL.graph)
+    without_c = replace(operations.OPERATIONS[CAUSAL_CONV], kind=LayerKind("new", 99, lambda layer, x: x))
+    monkeypatch.setitem(operations.OPERATIONS, "unknown to C", without_c)
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: graph))
+    monkeypatch.setattr(training, "fit", lambda *_, **__: pytest.fail("the training began"))
+    with pytest.raises(AirTouchError, match=message):
+        best.fit([made_flight()], recipe=SMALL)
 
 
 @pytest.mark.parametrize("change, message", [
@@ -67,5 +104,5 @@ def test_a_shape_that_no_model_file_holds_is_refused_before_the_training(change,
 def test_the_widest_and_the_deepest_network_fit_the_kernels():
     """The C takes 10 convolutions and a window of at most 65,535 samples (gap8/kernels/stream_int8.h)."""
     widest = Recipe(width=64, first_taps=16, taps=8, dilations=(256,) * 9)
-    assert sum(layer.operation == CAUSAL_CONV for layer in widest.graph) == 10
+    assert sum(not layer.reads for layer in widest.graph) == 10
     assert widest.receptive_samples < 65_535

@@ -40,8 +40,11 @@ def test_a_wake_that_shakes_more_than_a_simulator_can_be_given_has_a_note():
     (("mass", "range_bias"), None, "range_bias cannot be seen"), (("mass",), None, None),
     (("mass", "range_bias"), SimpleNamespace(), None)])
 def test_a_candidate_that_a_replay_does_not_show_is_said_so(names, inference, words):
-    sentences = cannot_be_replayed(SimpleNamespace(single_effects=dict.fromkeys(names), inference=inference))
+    selection = SimpleNamespace(single_effects=dict.fromkeys(names), inference=inference, library_holds=False)
+    sentences = cannot_be_replayed(selection)
     assert [s[:len(words)] for s in sentences] == [words] if words else sentences == []
+    selection.library_holds = True
+    assert not any("no library" in sentence for sentence in cannot_be_replayed(selection))
 
 
 def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():

@@ -92,7 +92,10 @@ def infer_new_flights():
         patch.setattr(learning, "features", lambda flight, vehicle: whole(flight, vehicle)[few])
         for module in (build, calibration):
             patch.setattr(module, "all_drawings", lambda: [d for e in ("mass", "imu_noise") for d in drawings(e)])
-        library = build.build(SCENE, FEW_FLIGHTS)
+        steps: list[str] = []
+        library = build.build(SCENE, FEW_FLIGHTS, steps.append)
+        assert [step.partition(":")[0] for step in steps if ": " in step] == [
+            "1 of 2", "2 of 2", "calibration, 1 of 2", "calibration, 2 of 2"]
 
         def inferences(effects):
             new = [fly(SCENE, NOT_LEARNED_FROM + i, activate(effects)) for i in range(JUDGED)]

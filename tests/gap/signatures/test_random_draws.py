@@ -46,9 +46,9 @@ def test_a_logarithm_is_as_likely_anywhere():
 def test_an_effect_of_ones_own_is_drawn_in_any_direction_that_its_bounds_allow():
     parameters = (Parameter("up", "N", 0.5, 0.0, 9.0, 0.0, ""), Parameter("down", "N", -0.5, -9.0, 0.0, 0.0, ""),
                   Parameter("either", "N", 0.5, -9.0, 9.0, 0.0, ""), Parameter("shape", "m", 2.0, 0.0, 9.0, None, ""))
-    effect = Effect("magnet", "", parameters)
+    effect = Effect("made_up_magnet", "", parameters)
     (kind,) = kinds_of(effect).values()
-    assert kind.highest == STEPS and "magnet" not in EFFECTS
+    assert kind.highest == STEPS and "made_up_magnet" not in EFFECTS
     values = [kind.make(2.0, np.random.default_rng(i)) for i in range(200)]
     table = np.array([[v["up"], v["down"], v["either"]] for v in values])
     assert np.linalg.norm(table, axis=1) == pytest.approx(np.full(200, 2.0 * 0.5))

@@ -44,10 +44,10 @@ def compare_all(tasks: Sequence[Task], keep: Path | None, jobs: int) -> dict[str
     todo = [task for task in tasks if any(name + task.note not in row_of for name, _ in task.group.logs)]
     # forked processes need not import anything again
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
-        for task, rows in zip(todo, pool.map(_rows_of, todo), strict=True):
+        for done, (task, rows) in enumerate(zip(todo, pool.map(_rows_of, todo), strict=True), 1):
             row_of |= {row["file"]: row for row in rows}
             json_lines.append(keep, rows)
-            print(f"{task.group.of}, {task.group.name}{task.note}: {len(rows)} flights",
+            print(f"{done} of {len(todo)}: {task.group.of}, {task.group.name}{task.note}: {len(rows)} flights",
                   file=sys.stderr, flush=True)
     return row_of
 

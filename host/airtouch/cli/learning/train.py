@@ -18,6 +18,7 @@ from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
+from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.shared import sensors
@@ -91,7 +92,7 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
         options["free_air"] = air.read(free_air, lambda line: click.echo(f"left out of free air: {line}", err=True))
     began = time.monotonic()
     if not simulated:
-        training, failures = _read(flights, evaluate.spare_of(module), _arm_pwm(module, options))
+        training, failures = _read(flights, evaluate.spare_of(module), _arm_pwm(detector, options))
     checkpoints = out.with_suffix(".training")
     if detector == "best" and any(checkpoints.glob("*")):
         click.echo(f"{checkpoints}: kept by a stopped training; what it did with the same flights and options is not "
@@ -150,10 +151,15 @@ def _progress_bars() -> Iterator[Callable[[str, int, int, str], None]]:
         yield progress
 
 
-def _arm_pwm(module: registry.Detector, options: dict[str, Any]) -> float | None:
-    """`evaluate.arm_pwm_by` of the model to train: by --vehicle, else by the model to start from."""
-    craft = options.get("vehicle")
-    return craft.arm_pwm if craft else evaluate.arm_pwm_by(module, options.get("start"))
+def _arm_pwm(detector: str, options: dict[str, Any]) -> float | None:
+    """Mean PWM above which `best` takes the vehicle to be in the air: of --vehicle, --start or its recipe; else None.
+
+    The shipped model has no part in it: after a change of the network it can no longer be loaded.
+    """
+    if detector != "best":
+        return None
+    craft, start = options.get("vehicle"), options.get("start")
+    return craft.arm_pwm if craft else (start.recipe if start else Recipe()).motion.arm_pwm
 
 
 def _read(paths: tuple[Path, ...], spare: int, arm_pwm: float | None) -> tuple[list[FlightLog], int]:

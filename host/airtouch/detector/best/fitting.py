@@ -33,8 +33,8 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     settings: `FitSettings()` for None. changes: fields of it, or of its recipe, by name: `fit(flights, steps=300)`.
     The model's lag is the median over the training flights, or over `settings.lag_of`; its metadata hold the flights'
     names and hashes, and the hashes of `settings.free_air`.
-    Raises AirTouchError without TensorFlow, without flights with edges, for unknown changes, and for a recipe of
-    another shape than that of `settings.start`.
+    Raises AirTouchError without TensorFlow, without flights with edges, for unknown changes, for a network that the
+    C kernels do not take, and for a recipe of another shape than that of `settings.start`.
     """
     from airtouch.detector.best import quantisation, training
     from airtouch.detector.shared.tensorflow import use_tensorflow
@@ -42,6 +42,7 @@ def fit(flights: Sequence[FlightLog], seed: int = 0, settings: FitSettings | Non
     settings, recipe = (settings or FitSettings()).resolved(changes)
     examples, start = Examples.drawn(flights, settings, seed), settings.start
     recipe = examples.muted(recipe)
+    quantisation.check_runs_in_c(recipe)
     report = settings.progress or (lambda *_: None)
     use_tensorflow(seed)
     training_flights = _training_flights(examples, recipe, report)

@@ -1,7 +1,8 @@
 """A trained model of `best` as one `.npz` file: float and int8 weights, decoder settings, how it came about.
 
 Arrays: "<layer>.kernel" and "<layer>.bias" float32; "int8.<layer>.weights", ".bias", ".weight_scale", ".scale" and
-".zero_point" (input, output); "tflite"; "metadata" (JSON, UTF-8). Nothing in the file is ever executed.
+".zero_point" (input, output); "tflite"; "metadata" (JSON, UTF-8), with the names of the motion channels where they are
+not those of the first files. Nothing in the file is ever executed.
 """
 
 import hashlib
@@ -23,6 +24,7 @@ from airtouch.detector.shared import archive
 from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 from airtouch.reference.edge_decoder import DecoderConfig
+from airtouch.reference.motion_channels import NAMES
 from airtouch.reference.networks.stream_int8 import StreamNetwork
 from airtouch.vehicle import Vehicle
 
@@ -32,6 +34,9 @@ SHIPPED = "best.npz"
 SPARES = {"acceleration": "best_without_acceleration.npz"}
 KIND = {"format": FORMAT, "network": "stream"}  #: metadata that tell this file from that of another network
 _INT8 = {"weights": np.int8, "bias": np.int32, "weight_scale": np.float32, "scale": np.float32, "zero_point": np.int32}
+#: channels of files that name none: so that a file is as it was before they could be others
+_FIRST_CHANNELS = ("ax", "ay", "az", "gyro x", "gyro y", "gyro z", "motor roll", "motor pitch", "motor yaw",
+                   "motor mean", "unexplained az", "zero")
 #: settings of files written before these fields existed
 _BEFORE = {"silent_acceleration": 0.0, "silent_rates": 0.0, "silent_motors": 0.0, "phases": 0.0, "free_air_share": 0.0}
 
@@ -103,7 +108,8 @@ class BestModel:
         recipe = asdict(self.recipe)
         if self.recipe.vehicle is None:
             del recipe["vehicle"]  # so that a file is as it was before there was a choice
-        return archive.to_bytes(arrays, {**KIND, "recipe": recipe, **self.metadata})
+        channels = {} if NAMES == _FIRST_CHANNELS else {"channels": NAMES}
+        return archive.to_bytes(arrays, {**KIND, "recipe": recipe, **channels, **self.metadata})
 
     def c_sources(self) -> dict[str, str]:
         """File name -> text of its C sources, without the lines that say where they came from."""
@@ -152,6 +158,8 @@ def parse(data: bytes, source: str) -> BestModel:
     """A model from a file's content; `source` names it in messages. Raises as `load` does."""
     arrays, metadata = archive.parse(data, source)
     archive.check_kind(metadata, KIND, source)
+    if metadata.pop("channels", list(_FIRST_CHANNELS)) != list(NAMES):
+        raise AirTouchError(f"{source}: a model of other motion channels than {', '.join(NAMES)}; {archive.REMEDY}")
     recipe = _recipe(metadata.pop("recipe", None), source)
     floats = weight_shapes(recipe.graph)
     shapes: dict[str, tuple[type, tuple[int, ...]]] = {name: (np.float32, shape) for name, shape in floats.items()}

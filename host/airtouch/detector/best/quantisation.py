@@ -1,5 +1,6 @@
 """Float weights of `best` to int8, with scales as TensorFlow Lite chooses them."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ from airtouch.detector.best.operations import OPERATIONS
 from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
 from airtouch.errors import AirTouchError
+from airtouch.kernels.stream import arena_bytes
 from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
@@ -42,6 +44,24 @@ def quantise_network(weights: Weights, recipe: Recipe, representative: np.ndarra
     content = convert(window_logits(weights, recipe.graph), (1, 1, recipe.receptive_samples, recipe.graph[0].inputs),
                       representative[:, None, None])
     return network_of(read_weighted_layers(content), recipe), content
+
+
+def check_runs_in_c(recipe: Recipe) -> None:
+    """Raise AirTouchError unless the C kernels as they are built take the network: its graph, shapes and arithmetic.
+
+    Made weights, all 1, stand for trained ones, so that it is known before a training.
+    """
+    arrays: list[dict[str, np.ndarray]] = []
+    for layer in recipe.graph:
+        kernel = OPERATIONS[layer.operation].kernel_shape(layer)
+        arrays.append({"weights": np.ones((layer.outputs, math.prod(kernel) // layer.outputs), np.int8),
+                       "bias": np.zeros(layer.outputs, np.int32), "weight_scale": np.ones(layer.outputs, np.float32),
+                       "scale": np.ones(2, np.float32), "zero_point": np.zeros(2, np.int32)})
+    try:
+        arena_bytes(network_of(arrays, recipe))
+    except AirTouchError as error:
+        raise AirTouchError(f"training: the C kernels do not take this network ({error}); after a change of "
+                            "gap8/kernels, `make setup` builds them again") from None
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:

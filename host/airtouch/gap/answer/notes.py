@@ -42,8 +42,9 @@ def cannot_be_replayed(selection: Selection) -> list[str]:
     names = [n for n in RELATIONS_ONLY if n in selection.single_effects]
     if selection.inference is not None or not names:
         return []
-    return [f"{' and '.join(names)} cannot be seen: only the relations of the signals show them, of which no library "
-            "holds for these flights"]
+    reason = "and here the replay gave the answer" if selection.library_holds else (
+        "of which no library holds for these flights")
+    return [f"{' and '.join(names)} cannot be seen: only the relations of the signals show them, {reason}"]
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

@@ -18,6 +18,7 @@ from airtouch.gap.signatures.signature import RELATIONS_ONLY
 
 GAP_AT_FLOOR = "the gap as a whole is at its floor"
 NOT_REPLAYED = "only the relations of the signals show it, of which no library holds for these flights"
+NOT_ASKED = "only the relations of the signals show it, and here the replay gave the answer"
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
 
@@ -53,7 +54,7 @@ def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, hypothesis.name)
     if hypothesis.name in RELATIONS_ONLY:
-        return NOT_REPLAYED
+        return NOT_ASKED if selection.library_holds else NOT_REPLAYED
     least = selection.least_nats[hypothesis.name]
     if hypothesis.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)

@@ -46,7 +46,7 @@ def selection_by_relations(search: Search, inference: Inference, rank_all: bool 
     return Selection(
         single_effects=search.single_effects if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
         halves=search.trial.halves, least_nats=search.least_nats, spectrum_is_assumed=False,
-        inference=inference, policy=search.trial.policy)
+        inference=inference, library_holds=True, policy=search.trial.policy)
 
 
 def matching(effect_class: EffectClass, variants: Sequence[Terms]) -> list[Terms]:

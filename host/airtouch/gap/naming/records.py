@@ -165,7 +165,8 @@ class Selection:
     on; least_nats: what each candidate must gain to be the first step, and have as evidence to count as more likely
     than none; policy: what the flights must show; spectrum_is_assumed: whether that of an effect of the last step is,
     as the effect is random or changes the loop of recorded flights; over_prediction: that of the effects named;
-    inference: what named the effects, where the relations of signals did; withdrawn: names that were withdrawn;
+    inference: what named the effects, where the relations of signals did; library_holds: whether a library of these
+    relations holds for the flights, also where the replay named the effects; withdrawn: names that were withdrawn;
     unsteadiness_rarity: how much less steady the flights are than nominal ones; outgained: passing effects, by name,
     that would be named but for one that always acts.
     """
@@ -179,6 +180,7 @@ class Selection:
     spectrum_is_assumed: bool
     over_prediction: OverPrediction = OverPrediction()
     inference: Inference | None = None
+    library_holds: bool = False
     withdrawn: WithdrawnNames = WithdrawnNames()
     unsteadiness_rarity: UnsteadinessRarity = UnsteadinessRarity()
     outgained: Mapping[str, OutgainedPassing] = field(default_factory=dict)

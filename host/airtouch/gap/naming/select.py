@@ -60,8 +60,10 @@ def select(data: Data, candidates: Mapping[str, Sequence[Terms]],
         return _by_relations(search, inference, without, rank_all)
     unusual = unusual_passing_effects(search, without)
     answer = _by_replay(search, _search_effects(search, passing_effect(search, unusual)), unusual)
-    if inference is None or _own_effect_explains(answer):
+    if inference is None:
         return answer
+    if _own_effect_explains(answer):
+        return replace(answer, library_holds=True)
     return _by_relations(search, inference, without, rank_all)
 
 
@@ -87,7 +89,7 @@ def _by_relations(search: Search, inference: Inference, without: Sequence[str], 
     partial = _search_effects(search, passing)
     if next(iter(partial.names), "") not in (OVERHEAD, inference.likeliest):
         return answer
-    return _by_replay(search, partial, unusual)
+    return replace(_by_replay(search, partial, unusual), library_holds=True)
 
 
 def replay_may_name(passing: Hypothesis | None, inference: Inference) -> bool:

@@ -97,9 +97,9 @@ def build(scene: Scene, settings: BuildSettings = SHIPPED, progress: Progress = 
     whitening = Whitening(standard, cholesky_factor(standard(features)))
     nominal = dict(zip(by_number, whitening(features), strict=True))
     nominal_mean = np.mean(list(nominal.values()), axis=0)
-    paired = []
-    for drawing in all_drawings():
-        progress(f"{drawing.name} {drawing.shape or ''}")
+    drawings, paired = all_drawings(), []
+    for number, drawing in enumerate(drawings, 1):
+        progress(f"{number} of {len(drawings)}: {drawing.name} {drawing.shape or ''}")
         paired.append(_paired_flights(scene, whitening, nominal, drawing, settings))
     progress("flights with nameless disturbances")
     nameless = np.array([whitening(f.features)[0] - nominal[f.number]

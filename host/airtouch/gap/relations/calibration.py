@@ -62,7 +62,7 @@ def calibrated(scene: Scene, library: Library, settings: CalibrationSettings, pr
     drawings = [drawing_of[c.name, c.shape] for c in library.model.classes]
     classes = []
     for place, (own, drawing) in enumerate(zip(library.model.classes, drawings, strict=True)):
-        progress(f"calibration of {own.name} {own.shape or ''}")
+        progress(f"calibration, {place + 1} of {len(drawings)}: {own.name} {own.shape or ''}")
         classes.append(replace(own, calibration=calibrate_class(scene, library, place, drawing, settings)))
     library = library.with_classes(classes)
     progress("flights of two effects")

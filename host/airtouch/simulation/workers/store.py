@@ -20,7 +20,7 @@ from typing import Any
 from airtouch import __version__, logs
 from airtouch.errors import AirTouchError
 from airtouch.logs import json_lines
-from airtouch.logs.files import MANIFEST, load_bytes, make_folder, read_text
+from airtouch.logs.files import FAILED, MANIFEST, REQUEST, load_bytes, make_folder, read_text
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation.firmware import settings
 from airtouch.simulation.flight import Chosen, Diverged
@@ -28,7 +28,6 @@ from airtouch.simulation.scenario import Scenario, draw_flight
 from airtouch.tables import is_number
 from airtouch.vehicle import Vehicle
 
-REQUEST, FAILED = "run.json", "diverged.jsonl"
 HEAD = "file,use,fold,height,angle_deg,wind,speed_mps"  #: first line of the manifest
 NUMBER = re.compile(r"(\d{6,})\.csv\.gz")  #: end of a flight's file name
 FLIGHT = re.compile(r".+_\d+_" + NUMBER.pattern)  #: a flight's file name

@@ -46,7 +46,7 @@ def test_flights_of_other_groups_have_one_baseline(compared):
     assert {name[0] for name in compared[0][1]} == {"b"} and len(compared[0][1]) == 5
 
 
-def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
+def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch, capsys):
     done = []
 
     def rows_of(task):
@@ -59,8 +59,10 @@ def test_what_the_file_holds_is_not_compared_again(tmp_path, monkeypatch):
     tasks = comparisons.tasks_of(groups)
     first = comparisons.compare_all(tasks, keep, 1)
     assert len(first) == 14 and done == ["a", "a, other groups", "b", "b, other groups"]
+    assert [line.split(":")[0] for line in capsys.readouterr().err.splitlines()] == [f"{i} of 4" for i in (1, 2, 3, 4)]
     keep.write_text("\n".join(line for line in keep.read_text().splitlines() if '"b1, ' not in line) + "\n")
     assert comparisons.compare_all(tasks, keep, 1) == first and done[4:] == ["b, other groups"]
+    assert capsys.readouterr().err.startswith("1 of 1: ")
 
 
 def test_rates_are_of_the_own_group_alone_and_both_comparisons_are_counted(monkeypatch):
