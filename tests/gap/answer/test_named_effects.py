@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from airtouch.gap.answer.named_effects import best_shape, with_random_part
+from airtouch.gap.answer.named_effects import in_median_shape, median_index, with_random_part
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.result import NamedEffect, Quantity
@@ -48,10 +49,18 @@ def test_a_random_part_of_another_effect_changes_nothing():
     assert with_random_part(effect, random_part_of("ground_effect")) is effect
 
 
+def test_the_median_of_shapes_is_that_of_the_posterior():
+    """By hand: that of the weights at which their sum passes half."""
+    assert median_index([3.0, 3.0, 3.0]) == 1
+    assert median_index(np.log([1.0, 2.0, 4.0, 8.0])) == 3
+    assert median_index([-900.0, 50.0, -900.0]) == 1
+    assert median_index(np.log([1.0, 1.0, 1.0, 1.0, 2.1])) == 3  # 4 of 6.1
+
+
 @pytest.mark.parametrize("fade", [0.0, 0.06])
 def test_the_shape_that_was_flown_is_found_from_any_other(study, fade):
     """How fast the lift of the ground dies out with height, from all the data."""
     data = Data(study, fly(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
     for start in terms("ground_effect"):
-        values = best_shape(data, whole_of(data), [start], None).terms[0].values
+        values = in_median_shape(data, whole_of(data), [start], None).terms[0].values
         assert values["fade"] == fade

@@ -1,4 +1,4 @@
-"""The effects named: fitted to all the data, in the shape that gains most, with 90 % intervals."""
+"""The effects named: fitted to all the data, in the median shape, with 90 % intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -16,9 +16,6 @@ from airtouch.gap.result import NamedEffect
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
-#: nats that another shape of an effect must gain on all the data; chosen. A larger number more often keeps the shape
-#: that the halves of the data chose
-SHAPE_PRICE = 1.0
 #: lower bound of the divisor of a random part, the effect's strength; chosen, far below any that is named
 LEAST_STRENGTH = 1e-6
 
@@ -33,7 +30,7 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
-    fitted = best_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
+    fitted = in_median_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
     named_terms = [t for t in fitted.terms if t.slot in selection.named_slots]
     effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits), readings)
                for t in named_terms if not t.companion]
@@ -50,20 +47,26 @@ def _named(term: Term, estimate: Estimate, readings: Mapping[str, Mapping[str, R
     return NamedEffect(term.name, term.quantities(x, covariance), term.gate)
 
 
-def best_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: np.ndarray | None) -> FittedTerms:
-    """Effects fitted to all the data, in the shape that gains most.
+def in_median_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: np.ndarray | None,
+                    ) -> FittedTerms:
+    """Effects fitted to all the data, each in the median of its shapes: as likely one before it as one after it.
 
-    start: scaled parameters from which the fit begins. A shape other than that of the terms must gain SHAPE_PRICE.
+    start: scaled parameters from which each fit begins. All shapes of an effect are as likely before the data. Where
+    the data can hardly tell them apart, the likeliest is one at the end of the list as often as not; the median is not.
     """
-    best, best_terms = fit(data, all_blocks, terms, start), list(terms)
+    chosen = list(terms)
     for i, term in enumerate(terms):
-        least = judge(data, all_blocks, best.terms) + SHAPE_PRICE
-        for shape in term.shaped():
-            trial = fit(data, all_blocks, [*best_terms[:i], shape, *best_terms[i + 1:]], start)
-            log_likelihood = judge(data, all_blocks, trial.terms)
-            if log_likelihood > least:
-                best, least, best_terms[i] = trial, log_likelihood, shape
-    return converged(data, all_blocks, best)
+        shapes = term.shaped()
+        if shapes:
+            fits = [fit(data, all_blocks, [*chosen[:i], shape, *chosen[i + 1:]], start) for shape in shapes]
+            chosen[i] = shapes[median_index([judge(data, all_blocks, f.terms) for f in fits])]
+    return converged(data, all_blocks, fit(data, all_blocks, chosen, start))
+
+
+def median_index(log_likelihoods: Sequence[float]) -> int:
+    """Number of the median of alternatives in their order, equally likely before the data, nats (n,)."""
+    weight = np.exp(np.array(log_likelihoods) - np.max(log_likelihoods))
+    return int(np.searchsorted(np.cumsum(weight), 0.5 * weight.sum()))
 
 
 def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:

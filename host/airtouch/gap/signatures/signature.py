@@ -22,7 +22,7 @@ WRONG = ("rotor_drag", "com_offset", "motor_lag", "thrust_coefficient", "imu_bia
 
 
 class Shape(NamedTuple):
-    """A parameter that half of the data can hardly tell: all the data choose one of these values in the end."""
+    """A parameter that half of the data can hardly tell, and its values, each between those beside it in effect."""
 
     parameter: str
     values: tuple[float, ...]
@@ -46,7 +46,7 @@ class Signature:
     free: parameters that a fit frees; the others have the same effect in most logs.
     variants: values of parameters that are tried one by one.
     free_later: parameters that are freed once a fit of the others is close.
-    shape: a shape that all the data choose in the end; None for an effect without.
+    shape: a shape of which all the data choose the median in the end; None for an effect without.
     alone_too: whether each free parameter is also tried alone.
     factors: whether its parameters are factors, neutral at 1, of which the logarithm is known.
     own_scatter: relative standard deviation of its strength from flight to flight that no likelihood shows.
@@ -125,7 +125,7 @@ def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
 SIGNATURES: dict[str, Signature] = {
     "ground_effect": Signature(
         ("strength",), variants=_each("fade", 0.0, 0.06, 0.0875, 0.129),
-        shape=Shape("fade", (0.0, 0.06, 0.0875, 0.105, 0.129, 0.16, 0.22)), without_random={"turbulence": 0.0},
+        shape=Shape("fade", (0.06, 0.0875, 0.105, 0.129, 0.16, 0.22, 0.0)), without_random={"turbulence": 0.0},
         at_edges=True,
         # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of
         # opened sealed sets
