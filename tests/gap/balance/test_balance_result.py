@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
-from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
+from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities, rotor_sets_of
 from airtouch.gap.balance.hover_ranking import closes_too_little, ranking_of, with_names_withdrawn
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
@@ -24,6 +25,33 @@ def test_the_hypotheses_of_a_name_count_together():
     named = [SimpleNamespace(name=n) for n in ("weak_motor", "weak_motor", "mass")]
     evidence = Evidence(np.log([1.0, 1.0, 2.0]) + 900.0, [])
     assert probabilities(evidence, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
+
+
+def rotors(*numbers):
+    """A hypothesis of weak rotors."""
+    return SimpleNamespace(name="weak_motor", effects=[("weak_motor", {"rotor": [float(n)]}) for n in numbers])
+
+
+def test_each_set_of_rotors_has_its_own_probability():
+    """Odds of 10, 20, 12 and 8 of weak motors, and 50 of a weight: 0.5 is a weak motor, and 0.2 the likeliest set."""
+    named = [rotors(1), rotors(4), SimpleNamespace(name="mass"), rotors(1, 3), rotors(2)]
+    sets = rotor_sets_of(Evidence(np.log([10.0, 20.0, 50.0, 12.0, 8.0]) - 900.0, []), named, 0.5)
+    assert [s.rotors for s in sets] == [(4,), (1, 3), (1,), (2,)]
+    assert [s.probability for s in sets] == pytest.approx([0.2, 0.12, 0.1, 0.08])
+    assert balance_result.other_rotors(sets) == [balance_result.OTHER_ROTORS.format("rotors 1 and 3 (12%)")]
+    assert balance_result.other_rotors(sets[:1]) == balance_result.other_rotors(()) == []
+
+
+def test_the_rotors_of_an_answer_are_the_likeliest_set():
+    """A fifth more of rotor 2 alone: no set of others competes with it, and all of them are the weak motor."""
+    nominal, weak = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(4)
+    result = balance_result.diagnosis([replace(weak, pwm=weak.pwm * [1.0, 1.2, 1.0, 1.0])], nominal, VEHICLE)
+    row = result.plain()["ranking"][0]
+    assert len(row["rotor_sets"]) == 10 and row["rotor_sets"][0]["rotors"] == [2]
+    assert sum(s["probability"] for s in row["rotor_sets"]) == pytest.approx(row["probability"], abs=1e-5)
+    assert not any("rotor_sets" in r for r in result.plain()["ranking"][1:])
+    assert not any("which rotors are weak" in note for note in result.notes)
+    assert "(probability 9" in sentences(result)[1] and ", most likely of rotor 2 (" in sentences(result)[1]
 
 
 @pytest.mark.parametrize(("total", "answer"), [

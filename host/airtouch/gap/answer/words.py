@@ -46,6 +46,11 @@ def name_in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def rotors_in_words(rotors: Sequence[int]) -> str:
+    """Rotors as a phrase: `rotor 1`, `rotors 1 and 3`."""
+    return f"rotor{'s' * (len(rotors) > 1)} {joined([str(r) for r in rotors])}"
+
+
 def effect_in_words(effect: NamedEffect) -> str:
     """The effect with its parameters, as `weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`, and when it acts."""
     when = seconds_in_words(effect)

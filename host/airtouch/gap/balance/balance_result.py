@@ -11,14 +11,16 @@ import numpy as np
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.shrink import fraction_closed
-from airtouch.gap.answer.words import joined
+from airtouch.gap.answer.words import joined, rotors_in_words
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, share_not_logged
 from airtouch.gap.balance.hover_posterior import (
+    COMPETES,
     HIGH,
     LOW,
     OTHER_WEIGHT,
+    WEAK_MOTOR,
     Likeliest,
     alike,
     answer_of,
@@ -26,12 +28,13 @@ from airtouch.gap.balance.hover_posterior import (
     likeliest_of,
     probabilities,
     quantile,
+    rotor_sets_of,
 )
 from airtouch.gap.balance.hover_ranking import NO_EFFECTS, ranking_of, with_names_withdrawn
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity
+from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RotorSet
 from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
@@ -52,6 +55,8 @@ NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 NO_VELOCITY = ("no velocity in some flights: how unsteady flights are is not judged, as it depends on how the "
                "estimated velocity is corrected")
+
+OTHER_ROTORS = "which rotors are weak is not sure: instead of those named it may be {}"
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
@@ -85,15 +90,18 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first] if effects else None, len(flights))
+    ranking = ranking_of(first, probability_of, closures, withdrawn)
+    if first == WEAK_MOTOR:
+        ranking[0] = replace(ranking[0], rotor_sets=rotor_sets_of(judged, candidates, ranking[0].probability))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(by_evidence, [e.name for e in effects], closures) if verdict == "effect" else None,
         notes=_notes(voltage, bool(np.isfinite(difference).all()), list(probability_of),
-                     [*notes, *_not_logged([*flights, *nominal])]),
+                     [*other_rotors(ranking[0].rotor_sets), *notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -169,6 +177,13 @@ def _notes(voltage: bool, velocity: bool, tried: Sequence[str], notes: Sequence[
     return (NO_GYRO.format(UNSTEADINESS if velocity else "", joined(effects)),
             *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
             *([] if voltage else [NO_VOLTAGE]), *([] if velocity else [NO_VELOCITY]))
+
+
+def other_rotors(rotor_sets: Sequence[RotorSet]) -> list[str]:
+    """A note on the sets of rotors that COMPETE with the likeliest, the first; none where there are none."""
+    others = [s for s in rotor_sets[1:] if s.probability > COMPETES * rotor_sets[0].probability]
+    words = " or ".join(f"{rotors_in_words(s.rotors)} ({s.probability:.0%})" for s in others)
+    return [OTHER_ROTORS.format(words)] if others else []
 
 
 def _not_logged(flights: Sequence[Flight]) -> list[str]:
