@@ -209,13 +209,29 @@ def test_an_effect_that_makes_a_gap_at_the_floor_larger_closes_too_little(after,
     assert closes_too_little(Closure(1.03, after, Quantity(0.0))) == too_little
 
 
-def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor():
+@pytest.mark.parametrize("seed", range(4, 12))
+def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor(seed):
     """Commands twice as unsteady about the nominal mean: a weak motor is likely by that, and makes the gap larger."""
-    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(4)
+    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(seed)
     mean = odd.pwm.mean(axis=0)
     result = balance_result.diagnosis([replace(odd, pwm=mean + 2.0 * (odd.pwm - mean))], nominal, VEHICLE)
     assert (result.verdict, result.effects) == ("unknown", ())
     assert next(r for r in result.ranking if r.name == "weak_motor").probability == 0.0
+
+
+@pytest.mark.parametrize(("before", "by_balance", "names"), [
+    (1.0, {"none": 0.5, "weak_motor": 0.3, "mass": 0.1, "com_offset": 0.1}, ["weak_motor", "mass"]),
+    (1.0, {"none": 0.25, "weak_motor": 0.2, "mass": 0.3, "com_offset": 0.25}, ["weak_motor"]),
+    (1.0, {"none": 0.2, "weak_motor": 0.3, "mass": 0.3, "com_offset": 0.2}, []),
+    (STANDS_OUT + 0.1, {"none": 0.5, "weak_motor": 0.3, "mass": 0.1, "com_offset": 0.1}, [])])
+def test_at_the_floor_an_effect_is_named_only_if_the_balance_makes_it_likelier_than_none(before, by_balance, names):
+    """A weight's two forms count together."""
+    total = {"none": 0.05, "weak_motor": 0.6, "mass": 0.2, "com_offset": 0.1, "unknown": 0.05}
+    closures = {n: Closure(before, 0.5, Quantity(1.0)) for n in total}
+    probability_of, withdrawn = with_names_withdrawn(total, closures, by_balance)
+    assert withdrawn == names and sum(probability_of.values()) == pytest.approx(1.0)
+    rows = {r.name: r.why for r in ranking_of(answer_of(probability_of)[0], probability_of, closures, withdrawn)}
+    assert all(rows[n].startswith("the gap is at its floor") for n in names)
 
 
 CLOSES = {"none": 0.0, "weak_motor": 0.74, "mass": 0.23, "slung_load": 0.1, "com_offset": 0.2, "unknown": 0.6}
@@ -232,7 +248,7 @@ EVIDENCE = {"none": 0.05, "weak_motor": 0.3, "mass": 0.35, "slung_load": 0.15, "
 def test_a_name_withdrawn_leaves_the_answer_to_the_next_that_closes_enough(closes, evidence, names, left):
     """Shares of what is left, by hand; where no effect comes next, `unknown` has what was withdrawn."""
     closures = {n: Closure(3.0, 1.0, Quantity(c)) for n, c in {**CLOSES, **closes}.items()}
-    probability_of, withdrawn = with_names_withdrawn({**EVIDENCE, **evidence}, closures)
+    probability_of, withdrawn = with_names_withdrawn({**EVIDENCE, **evidence}, closures, {})
     assert withdrawn == names
     assert {n: p for n, p in probability_of.items() if p} == pytest.approx(left)
 

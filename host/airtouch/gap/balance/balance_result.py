@@ -84,7 +84,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     by_evidence = probabilities(judged, candidates)
     fits = {name: likeliest_of(name, candidates, judged) for name in by_evidence}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
-    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures)
+    by_balance = probabilities(evidence(np.append(gap, [np.nan, np.nan]), base, candidates), candidates)
+    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures, by_balance)
     first, probability = answer_of(probability_of)
     verdict = first if first in NO_EFFECTS else "effect"
 
