@@ -170,6 +170,14 @@ def test_where_no_effect_is_named_nothing_closes_the_gap():
     assert "measured" not in shrink["weak_motor"]
 
 
+def test_where_every_effect_is_left_out_none_is_said_to_fail():
+    nominal, odd = [hovering(seed) for seed in (1, 2, 3)], hovering(4)
+    result = balance_result.diagnosis([replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])], nominal, VEHICLE,
+                                      without=("weak_motor", "mass", "com_offset", "slung_load"))
+    assert result.verdict == "unknown" and result.notes[0].endswith("; no effect was tried")
+    assert "no effect was tried" in sentences(result)[1] and "explains" not in sentences(result)[1]
+
+
 def test_a_name_that_leaves_the_gap_as_it_is_is_withdrawn():
     """Two rotors need more and a third one less, which no candidate makes: the likeliest closes hardly anything."""
     nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.98), (2, 1.0), (3, 1.02))], hovering(4)

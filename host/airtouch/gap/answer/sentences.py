@@ -55,6 +55,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"No unmodelled effect stands out (probability {probability})."
     if diagnosis.verdict == "unknown":
+        if diagnosis.ranking and all(r.name in ("none", "unknown") for r in diagnosis.ranking):
+            return f"Something acts (probability {probability}), but no effect was tried."
         near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")
                      and r.probability >= LEAST_PROBABILITY), None)
         return (f"No known effect explains it (probability {probability})"

@@ -46,8 +46,8 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 #: (`signature.WRONG` has others)
 WRONG_IN_HOVER = ("com_offset", "slung_load", "mass", "weak_motor")
 WRONG_BELOW = 0.1  #: probability below which an effect is surely wrong; chosen
-NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; the only "
-           "effects tried are {}")
+NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; {}")
+TRIED, NONE_TRIED = "the only effects tried are {}", "no effect was tried"  #: in NO_GYRO
 UNSTEADINESS = ", and how unsteady it is"  #: in NO_GYRO, where that is judged
 OWN_NOT_TRIED = "effects of your own are not tried where flights have no gyro and hovers are judged: {}"
 NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
@@ -175,7 +175,8 @@ def _notes(voltage: bool, velocity: bool, tried: Sequence[str], notes: Sequence[
     voltage, velocity: whether all flights log that of the battery, and their own; tried: names of the candidates.
     """
     effects, own = [n for n in tried if n not in NO_EFFECTS], [n for n in EFFECTS if n not in NAMES]
-    return (NO_GYRO.format(UNSTEADINESS if velocity else "", joined(effects)),
+    which = TRIED.format(joined(effects)) if effects else NONE_TRIED
+    return (NO_GYRO.format(UNSTEADINESS if velocity else "", which),
             *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
             *([] if voltage else [NO_VOLTAGE]), *([] if velocity else [NO_VELOCITY]))
 
