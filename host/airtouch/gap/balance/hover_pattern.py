@@ -17,8 +17,8 @@ from airtouch.logs.flight_log import VELOCITY
 from airtouch.logs.segments import runs
 from airtouch.vehicle import Vehicle
 
-#: thrust at a PWM grows with voltage to this power: 1.2 between the nominal flights of CrazyPAD, 1.0 within one
-#: (host/docs/gap-crazypad.md)
+#: thrust at a PWM grows with voltage to this power; chosen: the lift commanded falls with voltage to the power 1.1
+#: between CrazyPAD's four nominal flights of E8, 1.2 between three of E9 (least squares of the logarithms)
 VOLTAGE_EXPONENT = 1.2
 VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
 SETTLE_S = 0.8  #: s at either end of a stretch in the air that do not count; chosen
