@@ -206,12 +206,14 @@ def test_spectra_of_a_nominal_flight_lie_at_their_floor():
             assert 0.5 < spectrum.before[band].mean() / spectrum.floor[band].mean() < 2.0, (channel.name, low)
 
 
-def test_a_command_has_no_floor_where_no_nominal_flights_give_one(monkeypatch):
-    """The noise of the sensors, which stands for them, is not in a command."""
+def test_a_command_has_the_floor_of_nominal_flights_and_none_without_them(monkeypatch):
+    """The noise of the sensors, which stands for them, is not in a command. Its power here is 2 T."""
     monkeypatch.setattr(Study, "residual", lambda *_: np.random.default_rng(0).normal(size=(len(TIME_S), COUNT)))
-    force, command = pictures(hover(1, length_s=SECONDS),
-                              cells=[cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]).spectra
+    flown, cells = hover(1, length_s=SECONDS), [cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]
+    force, command = pictures(flown, cells=cells).spectra
     assert force.floor is not None and command.channel == "command_yaw" and command.floor is None
+    _, command = pictures(flown, cells=cells, nominal=[flown]).spectra
+    assert command.floor[2:-1].mean() == pytest.approx(2.0 * PERIOD_S, rel=0.25)
 
 
 def test_spectrum_after_lacks_the_power_of_a_mean_effect():
