@@ -211,3 +211,19 @@ def test_a_ratio_that_stays_is_written_alike_before_and_after():
     assert stays["text"] == stays["after"] == "3.0×"
     shrunk = gap_tables.heat_map_cell(cell("force_x", "hover", 2.34, after=0.092))
     assert (shrunk["text"], shrunk["after"]) == ("23×", "0.9×")
+
+
+def test_a_cell_that_stands_out_with_the_effects_alone_has_its_ratio_after_and_is_marked_as_worse(tmp_path):
+    """Gaps of 0.1 and 0.3 over floors of 0.1 to 0.12: the first comes out at 0.2, the second, at 0.31, is hardly worse.
+
+    A third is inside its floor before and after.
+    """
+    cells = [cell("torque_x", "hover", 0.1, after=0.2), cell("force_x", "hover", 0.3, after=0.31),
+             cell("force_y", "hover", 0.05, after=0.08)]
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis(cells), command="x")
+    source = (tmp_path / "gap.html").read_text()
+    in_map = source.split('class="map"')[1].split("</table>")[0]
+    assert re.findall(r"([\d.]+×)<small>(→ [\d.]+×▲?)<", in_map) == [("3.0×", "→ 3.1×"), ("1.0×", "→ 2.0×▲")]
+    assert in_map.count("→") == 2 and "1 worse than before" in source and "▲: worse than before" in source
+    gap_report.write_diagnosis(tmp_path / "none.html", diagnosis(cells[1:]), command="x")
+    assert "▲" not in (tmp_path / "none.html").read_text()

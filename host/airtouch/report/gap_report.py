@@ -95,7 +95,7 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
         "where": gap_tables.largest_rows(where, headline), "where_note": gap_tables.order_of_largest(where, headline),
         "images": _images(pictures),
         "example": example_effect() if shows_how_to_add else "",
-        "has_after": any(c.after is not None for c in cells),
+        "has_after": any(c.after is not None for c in cells), "has_worse": bool(summary.worse(cells)),
         "has_intervals": any(c.low is not None for c in cells), "version": __version__})
 
 

@@ -85,17 +85,21 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def heat_map_cell(cell: Cell) -> dict[str, str]:
-    """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size."""
+def heat_map_cell(cell: Cell) -> dict[str, Any]:
+    """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size.
+
+    after: the ratio with the named effects in the model, where the cell stands out without or with them, else "";
+    worse: whether it got worse with them.
+    """
     times, stands_out = cell.ratio, summary.stands_out(cell)
     shade = next(s for s in SHADES if times >= s.least) if stands_out else AT_FLOOR
     flights = f"{cell.flights} flight{'s' * (cell.flights != 1)}"
     title = "; ".join([in_words(cell), ", ".join(filter(None, [
         f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
         f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
-    after = "" if cell.after is None or not stands_out else _times(cell.ratio_after)
-    return {"text": _times(times), "colour": shade.background,
-            "ink": shade.ink, "title": title, "after": after}
+    has_after = cell.after is not None and (stands_out or summary.stays(cell))
+    return {"text": _times(times), "colour": shade.background, "ink": shade.ink, "title": title,
+            "after": _times(cell.ratio_after) if has_after else "", "worse": summary.got_worse(cell)}
 
 
 def _times(ratio: float) -> str:
