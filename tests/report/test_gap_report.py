@@ -227,3 +227,18 @@ def test_a_cell_that_stands_out_with_the_effects_alone_has_its_ratio_after_and_i
     assert in_map.count("→") == 2 and "1 worse than before" in source and "▲: worse than before" in source
     gap_report.write_diagnosis(tmp_path / "none.html", diagnosis(cells[1:]), command="x")
     assert "▲" not in (tmp_path / "none.html").read_text()
+
+
+def test_what_stays_over_the_floor_names_the_cells_that_got_worse_and_the_answers_channel_beside_the_largest(tmp_path):
+    """Eleven cells of lift stay at 5 to 6 times the floor; three smaller ones stay too, of which two are named."""
+    large = [cell("force_z", "hover", 1.0, after=0.6 - 0.01 * i, band_hz=(float(i), i + 1.0)) for i in range(11)]
+    worse, own, other = (cell("torque_x", "cruise", 0.1, after=0.2), cell("force_x", "cruise", 0.4, after=0.3),
+                         cell("torque_y", "cruise", 0.4, after=0.3))
+    headline = cell("force_x", "hover", 9.0, after=0.05)
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis([*large, worse, own, other, headline],
+                                                                headline=headline), command="x")
+    listed = (tmp_path / "gap.html").read_text().split("What stays over the floor")[1].split("</ul>")[0]
+    assert listed.count("<li>") == 12 and "pitch torque" not in listed
+    assert listed.count("lift") == 10 and listed.count("forward force") == 1
+    assert listed.count("roll torque") == listed.count("worse than before") == 1
+    assert "And 2 more cells" in (tmp_path / "gap.html").read_text()

@@ -31,7 +31,8 @@ AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
 #: (background colour, text colour, text) of each shade
 LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
           *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
-MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
+#: cells that stay over the floor, as many as the page names in words, and as many more that concern the answer; chosen
+MOST_REMAINING = 10
 
 
 def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
@@ -124,6 +125,16 @@ def order_of_largest(cells: Sequence[Cell], headline: Cell | None = None) -> str
         parts.append(f"The {'others' if parts else 'cells'} stand out, the surest first: by the lower end of the gap's "
                      "interval over the upper end of the floor's.")
     return " ".join(parts)
+
+
+def remaining_to_name(remaining: Sequence[Cell], headline: Cell | None) -> list[Cell]:
+    """Of the cells that stay over the floor, largest first: the first, then those others that concern the answer.
+
+    The latter are the cells that got worse with the named effects, and those of the headline's channel.
+    """
+    more = [c for c in remaining[MOST_REMAINING:]
+            if summary.got_worse(c) or (headline is not None and c.channel == headline.channel)]
+    return [*remaining[:MOST_REMAINING], *more[:MOST_REMAINING]]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
