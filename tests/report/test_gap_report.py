@@ -3,19 +3,22 @@ own."""
 
 import re
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import airtouch
 import made_diagnosis
+from airtouch.cli.gap import show
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Closure, NamedEffect, OpenCell, Quantity, Rejected
+from airtouch.gap.result import FITTED, HELD_OUT, Closure, NamedEffect, OpenCell, Quantity, Rejected
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -242,3 +245,19 @@ def test_what_stays_over_the_floor_names_the_cells_that_got_worse_and_the_answer
     assert listed.count("lift") == 10 and listed.count("forward force") == 1
     assert listed.count("roll torque") == listed.count("worse than before") == 1
     assert "And 2 more cells" in (tmp_path / "gap.html").read_text()
+
+
+@pytest.mark.parametrize(("judged_on", "seconds", "data"), [
+    (HELD_OUT, (), "held out (of a passing effect: on those that it is fitted to)"),
+    (FITTED, (("one.csv", 1.0, 2.0),), "held out (of a passing effect: on those that it is fitted to)"),
+    (FITTED, (), "that it is fitted to")])
+def test_page_and_terminal_say_on_what_data_a_shrink_is_measured(judged_on, seconds, data, tmp_path):
+    """Held out; of a passing effect, or without a gyro, of which no half can be held out, on what it was fitted to."""
+    result = replace(diagnosis([cell("force_x", "hover", 1.0, after=0.1)],
+                               effects=(NamedEffect("downwash", {}, seconds),)), judged_on=judged_on)
+    gap_report.write_diagnosis(tmp_path / "gap.html", result, command="x")
+    text, _ = checked(tmp_path / "gap.html")
+    screen = Console(width=300, file=StringIO())
+    show.diagnosis(screen, result)
+    for shown in (text, screen.file.getvalue()):
+        assert f"goes away on data {data}, with its 90 % interval" in " ".join(shown.split())

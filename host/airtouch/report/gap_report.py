@@ -68,7 +68,7 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         title="Gap between flights and simulator: diagnosis", answers=sentences(diagnosis),
         headline=diagnosis.headline, cells=cells, floor_from=diagnosis.map.floor_from if diagnosis.map else "",
         where=diagnosis.where, steps=diagnosis.next, anchor=ANCHOR, effects=gap_tables.effect_rows(diagnosis),
-        ranking=gap_tables.ranking_rows(diagnosis),
+        ranking=gap_tables.ranking_rows(diagnosis), data_of_shrink=words.data_of_shrink(diagnosis),
         indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart."
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
