@@ -34,8 +34,8 @@ from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
-#: what is grey in the plot of a signal
-FLOOR_DRAWN = "Grey: the floor in this band (rms) in each phase. "
+#: what the grey lines are in the plot of a signal
+FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase. "
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
