@@ -83,6 +83,20 @@ def test_plots_are_made_of_whatever_is_there():
         assert image.startswith(b"\x89PNG") and len(image) > 5000
 
 
+def figure_of_flight(monkeypatch, edges):
+    """The figure of a flight's plot, before it is made a PNG."""
+    drawn, flight = [], flight_shown()
+    monkeypatch.setattr(figures, "png", lambda figure: drawn.append(figure) or b"")
+    figures.flight(flight.log, flight.trace, edges, {})
+    return drawn[0]
+
+
+@pytest.mark.parametrize(("edges", "explained"), [(EDGES, True), (None, False), ([], False)])
+def test_true_edges_are_explained_where_they_are_drawn(monkeypatch, edges, explained):
+    *_, lowest = (ax for ax in figure_of_flight(monkeypatch, edges).axes if ax.get_xlabel())
+    assert lowest.get_xlabel().startswith("time, s") and ("dashed green" in lowest.get_xlabel()) is explained
+
+
 def test_curves_are_those_of_the_edges_and_samples():
     both_hit, none_hit = flight_shown().score, flight_shown(detections=()).score
     hits = hit_curve([both_hit, none_hit])

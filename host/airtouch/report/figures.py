@@ -67,7 +67,7 @@ def flight(
             for edge in edges or ():
                 ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=GREEN, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
-        axes[-1].set_xlabel("time, s (dashed green: true edges, from the down range)")
+        axes[-1].set_xlabel("time, s" + (" (dashed green: true edges, from the down range)" if edges else ""))
         return png(figure)
 
 
