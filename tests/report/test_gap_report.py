@@ -216,6 +216,12 @@ def test_a_ratio_that_stays_is_written_alike_before_and_after():
     assert (shrunk["text"], shrunk["after"]) == ("23×", "0.9×")
 
 
+def test_the_cell_of_the_answer_has_its_ratio_after_inside_its_floor_too():
+    inside = cell("force_y", "hover", 0.05, after=0.02)
+    assert gap_tables.heat_map_cell(inside, headline=True)["after"] == "0.2×"
+    assert gap_tables.heat_map_cell(inside)["after"] == ""
+
+
 def test_a_cell_that_stands_out_with_the_effects_alone_has_its_ratio_after_and_is_marked_as_worse(tmp_path):
     """Gaps of 0.1 and 0.3 over floors of 0.1 to 0.12: the first comes out at 0.2, the second, at 0.31, is hardly worse.
 

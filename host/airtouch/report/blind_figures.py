@@ -55,13 +55,13 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def _figure_at(score: Mapping[str, Any], place: str) -> Mapping[str, Any]:
-    """The figure at a place of the score; empty where there is none. An AUROC has the n of the wrong names beside."""
+    """The figure at a place of the score; empty where there is none. An AUROC has the n of the same flights' wrong names."""
     *keys, last = place.split("/")
     group: Mapping[str, Any] = score
     for key in keys:
         group = group.get(key, {})
     if last.startswith("auroc"):
-        return {"value": group.get(last), "n": group["wrong_name"]["n"]}
+        return {"value": group.get(last), "n": group[last.replace("auroc", "wrong_name")]["n"]}
     return group.get(last) or {}
 
 

@@ -60,7 +60,7 @@ def _map_rows(cells: Sequence[Cell], phase: str, headline: Cell | None) -> list[
         keys = [(channel.name, band) for band in bands(cells)]
         if any(key in place for key in keys):
             rows.append({"name": CHANNEL_WORDS[channel.name], "cells": [
-                {**heat_map_cell(place[key]), "headline": key == of_headline} if key in place else None
+                heat_map_cell(place[key], headline=key == of_headline) if key in place else None
                 for key in keys]})
     return rows
 
@@ -86,11 +86,11 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def heat_map_cell(cell: Cell) -> dict[str, Any]:
+def heat_map_cell(cell: Cell, headline: bool = False) -> dict[str, Any]:
     """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size.
 
-    after: the ratio with the named effects in the model, where the cell stands out without or with them, else "";
-    worse: whether it got worse with them.
+    headline: whether it is the one of the answer; after: the ratio with the named effects in the model, where the cell
+    is that or stands out without or with them, else ""; worse: whether it got worse with them.
     """
     times, stands_out = cell.ratio, summary.stands_out(cell)
     shade = next(s for s in SHADES if times >= s.least) if stands_out else AT_FLOOR
@@ -98,9 +98,10 @@ def heat_map_cell(cell: Cell) -> dict[str, Any]:
     title = "; ".join([in_words(cell), ", ".join(filter(None, [
         f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
         f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
-    has_after = cell.after is not None and (stands_out or summary.stays(cell))
+    has_after = cell.after is not None and (headline or stands_out or summary.stays(cell))
     return {"text": _times(times), "colour": shade.background, "ink": shade.ink, "title": title,
-            "after": _times(cell.ratio_after) if has_after else "", "worse": summary.got_worse(cell)}
+            "after": _times(cell.ratio_after) if has_after else "", "worse": summary.got_worse(cell),
+            "headline": headline}
 
 
 def _times(ratio: float) -> str:

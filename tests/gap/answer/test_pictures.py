@@ -141,6 +141,14 @@ def test_flight_of_the_signal_is_that_of_the_median_gap():
     assert pictures(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
 
 
+def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
+    """The third of three gaps, where the effect acts in this flight alone; without one that passes it is the second."""
+    flights = [flight(SECONDS, noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((1.0, 2.0, 3.0))]
+    passing = replace(bias(0.4), gate=(("3.0", 2.0, 4.0),))
+    assert pictures(*flights, effects=[passing]).signal.flight == "3.0"
+    assert pictures(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
+
+
 def test_flight_without_the_channel_does_not_count_for_the_median():
     """Of three gaps the middle one, though two more flights have no gyro; without any gyro there is no signal."""
     turning = [flight(SECONDS, gyro=noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((0.3, 0.1, 0.2))]

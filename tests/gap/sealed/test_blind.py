@@ -474,3 +474,11 @@ def test_the_goals_are_those_of_the_page_and_of_figures_of_a_score(blind_check):
     rows = {name: (value, n, goal) for name, value, n, goal in blind_figures.score_rows(blind_check[1])}
     assert rows["top-1, single effects"][1:] == ("4", "at least 95 %")
     assert rows["pairs: exact set"][1:] == ("2", "at least 85 %")
+
+
+def test_an_auroc_has_the_number_of_its_own_flights():
+    """Of flights that the data can tell apart, where there are fewer of them: 3 of 10."""
+    of_all = {"auroc": 0.9, "auroc_told_apart": 0.99, "wrong_name": {"value": 0.3, "low": 0.1, "high": 0.5, "n": 10},
+              "wrong_name_told_apart": {"value": 0.1, "low": 0.0, "high": 0.4, "n": 3}}
+    rows = {name: n for name, _, n, _ in blind_figures.score_rows({"unknown": {"all": of_all}})}
+    assert sorted(n for name, n in rows.items() if "AUROC" in name) == ["10", "3"]

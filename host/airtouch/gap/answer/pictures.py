@@ -111,7 +111,8 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
-    median = _median_residual(residuals, cells[0].channel)
+    acted_in = {name for t in effects for name, *_ in t.gate}
+    median = _median_residual([r for r in residuals if r.flight.name in acted_in] or residuals, cells[0].channel)
     signal = None if median is None else _signal(median, cells[0], whole_map)
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
