@@ -133,6 +133,14 @@ def test_the_file_gives_the_model_back(small, tmp_path):
         small.save(tmp_path / "m.npz")
 
 
+def test_a_file_with_a_layer_at_another_scale_than_the_layer_before_is_refused(small):
+    layers = list(small.int8.layers)
+    layers[2] = replace(layers[2], input_scale=1.5 * layers[2].input_scale)
+    wrong = replace(small, int8=replace(small.int8, layers=tuple(layers)))
+    with pytest.raises(AirTouchError, match=r"m.npz: int8: layer2 reads values of scale"):
+        model_file.parse(wrong.to_bytes(), "m.npz")
+
+
 @settings(max_examples=80, deadline=None)
 @given(st.data())
 def test_a_damaged_file_is_one_clear_line(small, data):

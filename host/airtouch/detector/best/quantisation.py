@@ -65,7 +65,23 @@ def check_runs_in_c(recipe: Recipe) -> None:
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
-    """The int8 network from the arrays of each layer (`reference.networks.stream_int8.int8_layer`)."""
+    """The int8 network from the arrays of each layer (`reference.networks.stream_int8.int8_layer`).
+
+    Raises AirTouchError unless there is one set of arrays a layer, and each layer reads int8 values by the scale and
+    the zero point that the layers before it give them.
+    """
     graph = recipe.graph
-    return StreamNetwork(graph, tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
-                                      for layer, part in zip(graph, arrays, strict=True)))
+    if len(arrays) != len(graph):
+        raise AirTouchError(f"int8: {len(arrays)} operators with weights for {len(graph)} layers; the `window` of an "
+                            "operation holds one")
+    layers = tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
+                   for layer, part in zip(graph, arrays, strict=True))
+    for i, (layer, int8) in enumerate(zip(graph, layers, strict=True)):
+        for j in layer.reads or range(max(i - 1, 0), i):
+            read, given = ((int8.input_scale, int8.input_zero_point),
+                           (layers[j].output_scale, layers[j].output_zero_point))
+            if read != given:
+                raise AirTouchError(f"int8: {layer.name} reads values of scale {read[0]:.5g} and zero point {read[1]}, "
+                                    f"{graph[j].name} gives {given[0]:.5g} and {given[1]}; in the `window` of an "
+                                    "operation only what keeps the scale stands beside the operator with weights")
+    return StreamNetwork(graph, layers)
