@@ -1,5 +1,6 @@
 """A network of another graph and with a fourth output is trained, scored, saved and exported, as the page says."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from airtouch.detector.best import batches, export, fit_settings, model, network
 from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
 from airtouch.detector.best.recipe import CHANNELS, Recipe
+from airtouch.detector.evaluation.data import simulated
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES
@@ -80,7 +82,7 @@ def test_a_model_of_other_channels_is_refused_though_its_shape_is_the_same(small
 @needs("tensorflow")
 @pytest.mark.parametrize("of_layer2, message", [
     ({"reads": (0, 1)}, "convolutions in a row"), ({"operation": "unknown to C"}, r"layer 2 .* `make setup`")])
-def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_first_step(monkeypatch, of_layer2, message):
+def test_a_network_that_the_built_kernels_do_not_take_is_refused_at_once(monkeypatch, tmp_path, of_layer2, message):
     """A graph of another form, and an arithmetic that the C library was built without."""
     graph = tuple(replace(layer, **of_layer2) if layer.name == "layer2" else layer for layer in SMALL.graph)
     without_c = replace(operations.OPERATIONS[CAUSAL_CONV], kind=LayerKind("new", 99, lambda layer, x: x))
@@ -89,6 +91,9 @@ def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_firs
     monkeypatch.setattr(training, "fit", lambda *_, **__: pytest.fail("the training began"))
     with pytest.raises(AirTouchError, match=message):
         best.fit([made_flight()], recipe=SMALL)
+    monkeypatch.setattr(simulated, "training_flights", lambda *_, **__: pytest.fail("flights were simulated"))
+    told = CliRunner().invoke(train.command, ["--simulated", "4", "--out", str(tmp_path / "mine.npz")])
+    assert isinstance(told.exception, AirTouchError) and re.search(message, str(told.exception))
 
 
 @pytest.mark.parametrize("change, message", [
