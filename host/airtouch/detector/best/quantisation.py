@@ -11,6 +11,7 @@ from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
 from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
+from airtouch.reference.networks.int8_network import DENSE
 from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
@@ -60,8 +61,9 @@ def check_runs_in_c(recipe: Recipe) -> None:
     try:
         arena_bytes(network_of(arrays, recipe))
     except AirTouchError as error:
-        raise AirTouchError(f"training: the C kernels do not take this network ({error}); after a change of "
-                            "gap8/kernels, `make setup` builds them again") from None
+        new = any(OPERATIONS[layer.operation].kind is not DENSE for layer in recipe.graph)
+        again = "; after a change of gap8/kernels, `make setup` builds them again" if new else ""
+        raise AirTouchError(f"training: the C kernels do not take this network ({error}){again}") from None
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
