@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from airtouch.detector import best
 from airtouch.detector.best import batches, export, fit_settings, model, network, operations, outputs, recipe, training
 from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
+from airtouch.detector.best.quantisation import check_runs_in_c
 from airtouch.detector.best.recipe import CHANNELS, Recipe
 from airtouch.detector.evaluation.data import simulated
 from airtouch.detector.shared import sensors
@@ -22,6 +24,8 @@ from airtouch.reference.networks.int8_network import LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
 from skips import needs
+
+PAGE = Path(__file__).parents[3] / "host/docs/change-the-network.md"
 
 
 @pytest.fixture
@@ -95,6 +99,19 @@ def test_a_network_that_the_built_kernels_do_not_take_is_refused_at_once(monkeyp
     monkeypatch.setattr(simulated, "training_flights", lambda *_, **__: pytest.fail("flights were simulated"))
     told = CliRunner().invoke(train.command, ["--simulated", "4", "--out", str(tmp_path / "mine.npz")])
     assert isinstance(told.exception, AirTouchError) and re.search(message, str(told.exception))
+
+
+def test_layers_of_other_widths_fit_the_kernels_with_the_head_of_the_page(monkeypatch):
+    (line,) = re.findall(r'`(StreamLayer\("layer4", HEAD.*)`', PAGE.read_text(encoding="utf-8"))
+    widths = (SMALL.width, 20, 16, 12)
+    inner = [replace(layer, inputs=before, outputs=after)
+             for layer, before, after in zip(SMALL.graph[1:4], widths[:-1], widths[1:], strict=True)]
+    too_narrow, fits = ((SMALL.graph[0], *inner, head) for head in (SMALL.graph[-1], eval(line, vars(recipe))))
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: too_narrow))
+    with pytest.raises(AirTouchError, match="layer 4 does not fit"):
+        check_runs_in_c(SMALL)
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: fits))
+    check_runs_in_c(SMALL)
 
 
 @pytest.mark.parametrize("change, message", [
