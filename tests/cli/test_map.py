@@ -152,3 +152,20 @@ def test_the_scale_bar_covers_nothing_of_a_flight_that_begins_at_the_lower_left(
         (text,) = [t for t in ax.texts if t.get_text()]
         top = ax.transData.inverted().transform(text.get_window_extent())[1, 1]
         assert max(top, ax.lines[-1].get_ydata().max()) < xy[:, 1].min()
+
+
+def test_the_band_of_an_outline_is_named_in_the_legend_and_reaches_two_sigma_beyond_it():
+    """A platform of 1 by 1 m, known to 0.05 m."""
+    from shapely.geometry import LineString, box
+
+    from airtouch.detector.evaluation.edge_map import EdgeMap, Platform
+    from airtouch.report import map_figure
+
+    xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.full(500, 0.5)])
+    sides = (LineString([(x, 0.0), (x, 1.0)]) for x in (0.0, 1.0))
+    square = Platform(*sides, box(0.0, 0.0, 1.0, 1.0), None, 0.05)
+    figure = map_figure.figure_of(EdgeMap(xy, [], [square], "logged", 0.0, 0.1), "a flight")
+    (band,) = (patch for patch in figure.axes[0].patches if "2 sigma" in patch.get_label())
+    assert band.get_label() in {text.get_text() for text in figure.legends[0].get_texts()}
+    corners = band.get_path().vertices
+    assert (corners[:, 0].min(), corners[:, 0].max()) == pytest.approx((-0.1, 1.1))

@@ -83,6 +83,31 @@ def test_plots_are_made_of_whatever_is_there():
         assert image.startswith(b"\x89PNG") and len(image) > 5000
 
 
+def figure_of_flight(monkeypatch, edges):
+    """The figure of a flight's plot, before it is made a PNG."""
+    drawn, flight = [], flight_shown()
+    monkeypatch.setattr(figures, "png", lambda figure: drawn.append(figure) or b"")
+    figures.flight(flight.log, flight.trace, edges, {})
+    return drawn[0]
+
+
+@pytest.mark.parametrize(("edges", "explained"), [(EDGES, True), (None, False), ([], False)])
+def test_true_edges_are_explained_where_they_are_drawn(monkeypatch, edges, explained):
+    *_, lowest = (ax for ax in figure_of_flight(monkeypatch, edges).axes if ax.get_xlabel())
+    assert lowest.get_xlabel().startswith("time, s") and ("dashed green" in lowest.get_xlabel()) is explained
+
+
+def test_band_power_has_a_scale_beside_it_and_all_panes_keep_one_time_axis(monkeypatch):
+    figure = figure_of_flight(monkeypatch, EDGES)
+    figure.draw_without_rendering()
+    (scale,) = (ax for ax in figure.axes if "dB" in ax.get_ylabel())
+    (powers,) = (ax for ax in figure.axes if ax.images)
+    panes = [ax for ax in figure.axes if ax is not scale]
+    assert scale.get_ylim() == powers.images[0].get_clim()
+    assert scale.get_position().y0 == pytest.approx(powers.get_position().y0, abs=0.01)
+    assert np.ptp([[ax.get_position().x0, ax.get_position().x1] for ax in panes], axis=0).max() < 1e-6
+
+
 def test_curves_are_those_of_the_edges_and_samples():
     both_hit, none_hit = flight_shown().score, flight_shown(detections=()).score
     hits = hit_curve([both_hit, none_hit])

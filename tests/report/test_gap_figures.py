@@ -52,6 +52,7 @@ def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown(dr
     floor = np.repeat([0.25, 1.0, np.nan], [50, 25, 25])
     (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=floor)).axes
     (grey,) = ax.collections
+    assert not len(grey.get_facecolor()) and grey.get_edgecolor()[0, 3] == 1.0  # lines, that tint no curve
     for inside, point in ((True, (4.0, 0.2)), (False, (4.0, 0.5)), (True, (6.0, -0.9)), (False, (8.0, 0.0))):
         assert any(path.contains_point(point) for path in grey.get_paths()) is inside, point
     (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=np.full(100, np.nan))).axes

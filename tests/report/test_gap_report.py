@@ -3,19 +3,22 @@ own."""
 
 import re
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import airtouch
 import made_diagnosis
+from airtouch.cli.gap import show
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.measurement import measure, pictures_of_measurement
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import Closure, NamedEffect, OpenCell, Quantity, Rejected
+from airtouch.gap.result import FITTED, HELD_OUT, Closure, NamedEffect, OpenCell, Quantity, Rejected
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
@@ -211,3 +214,50 @@ def test_a_ratio_that_stays_is_written_alike_before_and_after():
     assert stays["text"] == stays["after"] == "3.0×"
     shrunk = gap_tables.heat_map_cell(cell("force_x", "hover", 2.34, after=0.092))
     assert (shrunk["text"], shrunk["after"]) == ("23×", "0.9×")
+
+
+def test_a_cell_that_stands_out_with_the_effects_alone_has_its_ratio_after_and_is_marked_as_worse(tmp_path):
+    """Gaps of 0.1 and 0.3 over floors of 0.1 to 0.12: the first comes out at 0.2, the second, at 0.31, is hardly worse.
+
+    A third is inside its floor before and after.
+    """
+    cells = [cell("torque_x", "hover", 0.1, after=0.2), cell("force_x", "hover", 0.3, after=0.31),
+             cell("force_y", "hover", 0.05, after=0.08)]
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis(cells), command="x")
+    source = (tmp_path / "gap.html").read_text()
+    in_map = source.split('class="map"')[1].split("</table>")[0]
+    assert re.findall(r"([\d.]+×)<small>(→ [\d.]+×▲?)<", in_map) == [("3.0×", "→ 3.1×"), ("1.0×", "→ 2.0×▲")]
+    assert in_map.count("→") == 2 and "1 worse than before" in source and "▲: worse than before" in source
+    gap_report.write_diagnosis(tmp_path / "none.html", diagnosis(cells[1:]), command="x")
+    assert "▲" not in (tmp_path / "none.html").read_text()
+
+
+def test_what_stays_over_the_floor_names_the_cells_that_got_worse_and_the_answers_channel_beside_the_largest(tmp_path):
+    """Eleven cells of lift stay at 5 to 6 times the floor; three smaller ones stay too, of which two are named."""
+    large = [cell("force_z", "hover", 1.0, after=0.6 - 0.01 * i, band_hz=(float(i), i + 1.0)) for i in range(11)]
+    worse, own, other = (cell("torque_x", "cruise", 0.1, after=0.2), cell("force_x", "cruise", 0.4, after=0.3),
+                         cell("torque_y", "cruise", 0.4, after=0.3))
+    headline = cell("force_x", "hover", 9.0, after=0.05)
+    gap_report.write_diagnosis(tmp_path / "gap.html", diagnosis([*large, worse, own, other, headline],
+                                                                headline=headline), command="x")
+    listed = (tmp_path / "gap.html").read_text().split("What stays over the floor")[1].split("</ul>")[0]
+    assert listed.count("<li>") == 12 and "pitch torque" not in listed
+    assert listed.count("lift") == 10 and listed.count("forward force") == 1
+    assert listed.count("roll torque") == listed.count("worse than before") == 1
+    assert "And 2 more cells" in (tmp_path / "gap.html").read_text()
+
+
+@pytest.mark.parametrize(("judged_on", "seconds", "data"), [
+    (HELD_OUT, (), "held out (of a passing effect: on those that it is fitted to)"),
+    (FITTED, (("one.csv", 1.0, 2.0),), "held out (of a passing effect: on those that it is fitted to)"),
+    (FITTED, (), "that it is fitted to")])
+def test_page_and_terminal_say_on_what_data_a_shrink_is_measured(judged_on, seconds, data, tmp_path):
+    """Held out; of a passing effect, or without a gyro, of which no half can be held out, on what it was fitted to."""
+    result = replace(diagnosis([cell("force_x", "hover", 1.0, after=0.1)],
+                               effects=(NamedEffect("downwash", {}, seconds),)), judged_on=judged_on)
+    gap_report.write_diagnosis(tmp_path / "gap.html", result, command="x")
+    text, _ = checked(tmp_path / "gap.html")
+    screen = Console(width=300, file=StringIO())
+    show.diagnosis(screen, result)
+    for shown in (text, screen.file.getvalue()):
+        assert f"goes away on data {data}, with its 90 % interval" in " ".join(shown.split())

@@ -42,6 +42,13 @@ def show_scatter(b: Balances) -> None:
         print(f"{text}, {AXES}: " + ", ".join(f"{100 * v:.1f} %" for v in values))
 
 
+def show_conditions(b: Balances) -> None:
+    """Print the mean change of the balance in each condition with cut blades."""
+    print(f"\nchange from the drone's normal flights, {AXES}")
+    for pair, mean in zip(b.pairs, b.means, strict=True):
+        print(f"  {' '.join(pair):55s} " + ", ".join(f"{100 * v:.1f} %" for v in mean))
+
+
 def show_rotor(tests: list[RotorTest]) -> None:
     """Print what the balance says of which rotor was cut, to a test that knows the rest."""
     print("\n| cut | flights | the cut changes less than two sets of propellers differ | changed to the predicted "
@@ -91,11 +98,12 @@ def show_family(b: Balances, vehicle: vehicles.Vehicle) -> None:
 
 
 def main() -> None:
-    """Print scatter, rotors and families."""
+    """Print scatter, conditions, rotors and families."""
     options = labels.folder_and_part(__doc__)
     rows, vehicle = labels.manifest(options.folder, options.part), vehicles.load(labels.VEHICLE)
     balances = Balances(rows, hover_patterns(options.folder, rows, vehicle))
     show_scatter(balances)
+    show_conditions(balances)
     show_rotor(rotor_tests(balances))
     show_family(balances, vehicle)
 

@@ -13,6 +13,7 @@ from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import (
     GYRO_UNUSED,
+    Flight,
     none_usable,
     ready,
     ready_flights,
@@ -41,8 +42,8 @@ class Measurement:
     gap: rms over the floor of all cells in the air, for the vehicle as declared and, with baseline flights, as
     calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
     flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
-    flights were not used; study: what the map holds them against, whose floor the pictures show; uses_gyro: whether a
-    gyro that the flights have is used, as it is where the baseline has one.
+    flights were not used; study: what the map holds them against; nominal: the baseline flights, whose floor the
+    pictures show; uses_gyro: whether a gyro that the flights have is used, as it is where the baseline has one.
     """
 
     vehicle: str
@@ -58,6 +59,7 @@ class Measurement:
     cannot: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     study: Study | None = field(default=None, compare=False, repr=False)
+    nominal: tuple[Flight, ...] = field(default=(), compare=False, repr=False)
     uses_gyro: bool = field(default=True, compare=False, repr=False)
 
     @property
@@ -154,7 +156,7 @@ def measure(flights: Iterable[FlightLog], vehicle: Vehicle, baseline: Iterable[F
         spectra=mean_spectra([m.power for m in measured], [command_power(f, vehicle) for f in nominal]),
         rotors=speeds_over_flights([m.speeds for m in measured]), notes=tuple(notes),
         cannot=cannot_of([m.cannot for m in measured]), left_out=(*of_baseline, *left_out), study=studies[0],
-        uses_gyro=uses_gyro)
+        nominal=tuple(nominal[:MOST_FLIGHTS]), uses_gyro=uses_gyro)
 
 
 def _measured(measure_one: Callable[[FlightLog], MeasuredFlight | str], flights: Iterable[FlightLog], mapper: Callable,
@@ -195,6 +197,6 @@ def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog],
     flights = with_gyro_if_any(list(ready_flights(first, vehicle, [])), []) if measurement.where else []
     if not flights:
         return Pictures(commands=measurement.spectra)
-    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, [], [], measurement.where,
-                         measurement.map.cells)
+    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, measurement.nominal, [],
+                         measurement.where, measurement.map.cells)
     return replace(curves, commands=measurement.spectra)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -98,12 +98,21 @@ class NamedEffect:
     seconds: tuple[tuple[str, float, float], ...] = ()
 
 
+class RotorSet(NamedTuple):
+    """Rotors, numbered from 1, and the probability that these and no others are weak."""
+
+    rotors: tuple[int, ...]
+    probability: float
+
+
 @dataclass(frozen=True)
 class RankedCandidate:
     """A candidate of the ranking.
 
     shrink: fraction of the gap that it closes on held-out data; why: the reason why it is not the answer; nats: log
-    likelihood that held-out data gain by it alone; measured: False where its shrink was not measured and stands as 0.
+    likelihood that held-out data gain by it alone; measured: False where its shrink was not measured and stands as 0;
+    rotor_sets: of weak_motor where hovers are judged without a gyro and it is the answer, likeliest first; their
+    probabilities add up to its own.
     """
 
     name: str
@@ -112,13 +121,14 @@ class RankedCandidate:
     why: str = ""
     nats: float | None = None
     measured: bool = True
+    rotor_sets: tuple[RotorSet, ...] = ()
 
     def plain(self) -> dict[str, Any]:
-        """JSON-ready, without a reason or nats that there are not; a shrink that was not measured says so."""
+        """JSON-ready, without a reason, nats or sets that there are not; a shrink that was not measured says so."""
         more = ({"why": self.why} if self.why else {}) | ({} if self.nats is None else {"nats": self.nats})
+        sets = {"rotor_sets": [s._asdict() for s in self.rotor_sets]} if self.rotor_sets else {}
         shrink = self.shrink.plain() | ({} if self.measured else {"measured": False})
-        return {"name": self.name, "probability": self.probability, "shrink": shrink, **more}
-
+        return {"name": self.name, "probability": self.probability, "shrink": shrink, **more, **sets}
 
 
 @dataclass(frozen=True)

@@ -65,10 +65,6 @@ class Study:
         """Residual (n, COUNT) of a flight, with effects in the model: `channels.residual`."""
         return residual(flight, self.vehicle, (*self.calibration, *active), self.loop)
 
-    def measured_blocks(self, state: str) -> int:
-        """Number of nominal blocks of a state on which its floor is measured; 0 where the floor is only declared."""
-        return self.floor.block_counts.get(state, 0) if self.nominal_count else 0
-
     @property
     def offset(self) -> np.ndarray:
         """Standard deviation (COUNT,) of a channel's mean in the air from flight to flight, in its unit.

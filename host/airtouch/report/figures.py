@@ -67,7 +67,7 @@ def flight(
             for edge in edges or ():
                 ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=GREEN, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
-        axes[-1].set_xlabel("time, s (dashed green: true edges, from the down range)")
+        axes[-1].set_xlabel("time, s" + (" (dashed green: true edges, from the down range)" if edges else ""))
         return png(figure)
 
 
@@ -129,10 +129,13 @@ def _band_power(ax: Axes, plotted: PlottedFlight) -> None:
     """Draw the band power of every channel, in dB over its median."""
     level = 10 * np.log10(np.maximum(plotted.trace.signals["band_power"].astype(float), LEAST_BAND_POWER))
     level -= np.nanmedian(level, axis=0)
-    ax.imshow(level.T, aspect="auto", cmap="magma", vmin=-5, vmax=20, interpolation="nearest",
-              extent=(plotted.time_s[0], plotted.time_s[-1], len(PAPER_CHANNELS) - 0.5, -0.5))
+    image = ax.imshow(level.T, aspect="auto", cmap="magma", vmin=-5, vmax=20, interpolation="nearest",
+                      extent=(plotted.time_s[0], plotted.time_s[-1], len(PAPER_CHANNELS) - 0.5, -0.5))
     ax.set_yticks(range(len(PAPER_CHANNELS)), PAPER_CHANNELS, fontsize=6)
-    ax.set_ylabel("band power\ndB on median", fontsize=8)
+    ax.set_ylabel("band power", fontsize=8)
+    bar = ax.figure.colorbar(image, ax=ax, pad=0.01, aspect=8, extend="both", ticks=(-5, 0, 10, 20))
+    bar.ax.tick_params(labelsize=6)
+    bar.set_label("dB on median", fontsize=7)
 
 
 def _probability(ax: Axes, plotted: PlottedFlight) -> None:

@@ -18,6 +18,7 @@ BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with 
 PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
 #: look of the gap without the named effects: broad and pale, so that it shows behind the gap with them
 BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
+FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of dense curves
 ABOVE = 2.5  #: zorder of the floor, above that of lines, which is 2: a dense curve would hide it
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
@@ -47,8 +48,8 @@ def signals(signal: Signal) -> bytes:
             limit(axes[0], signal.measured, *(signal.measured - gap for gap in gaps), **SIGNAL_LIMITS)
         gap = axes[0 if signal.measured is None else 1]
         if np.isfinite(signal.floor).any():
-            gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", color=FLOOR, alpha=0.5, lw=0,
-                             zorder=ABOVE, label="floor")
+            gap.fill_between(signal.time_s, -signal.floor, signal.floor, step="post", facecolor="none",
+                             edgecolor=FLOOR_LINE, lw=0.9, zorder=ABOVE, label="floor")
         gap.plot(signal.time_s, signal.before, label="gap" if signal.after is None else "gap before", **BEHIND)
         if signal.after is not None:
             gap.plot(signal.time_s, signal.after, color=AFTER, lw=1.0, label="gap after")

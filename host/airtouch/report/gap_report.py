@@ -34,8 +34,8 @@ from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
-#: what is grey in the plot of a signal
-FLOOR_DRAWN = "Grey: the floor in this band (rms) in each phase. "
+#: what the grey lines are in the plot of a signal
+FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase. "
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -68,12 +68,13 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         title="Gap between flights and simulator: diagnosis", answers=sentences(diagnosis),
         headline=diagnosis.headline, cells=cells, floor_from=diagnosis.map.floor_from if diagnosis.map else "",
         where=diagnosis.where, steps=diagnosis.next, anchor=ANCHOR, effects=gap_tables.effect_rows(diagnosis),
-        ranking=gap_tables.ranking_rows(diagnosis),
+        ranking=gap_tables.ranking_rows(diagnosis), data_of_shrink=words.data_of_shrink(diagnosis),
         indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart."
                            for g in diagnosis.indistinguishable],
         pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
-        remaining=remaining_in_words(remaining[:gap_tables.MOST_REMAINING]), remaining_count=len(remaining),
+        remaining=remaining_in_words(gap_tables.remaining_to_name(remaining, diagnosis.headline)),
+        remaining_count=len(remaining),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),
@@ -95,7 +96,7 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
         "where": gap_tables.largest_rows(where, headline), "where_note": gap_tables.order_of_largest(where, headline),
         "images": _images(pictures),
         "example": example_effect() if shows_how_to_add else "",
-        "has_after": any(c.after is not None for c in cells),
+        "has_after": any(c.after is not None for c in cells), "has_worse": bool(summary.worse(cells)),
         "has_intervals": any(c.low is not None for c in cells), "version": __version__})
 
 

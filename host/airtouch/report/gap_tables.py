@@ -31,7 +31,8 @@ AT_FLOOR = Shade(0.0, "#f3f4f6", "#8a8f98")  #: of the other cells
 #: (background colour, text colour, text) of each shade
 LEGEND = [(AT_FLOOR.background, AT_FLOOR.ink, "floor"),
           *((s.background, s.ink, f"> {s.least:g}×" if s.least else "< 1.5×") for s in reversed(SHADES))]
-MOST_REMAINING = 10  #: cells that stay over the floor, as many as the page names in words; chosen
+#: cells that stay over the floor, as many as the page names in words, and as many more that concern the answer; chosen
+MOST_REMAINING = 10
 
 
 def bands(cells: Iterable[Cell]) -> list[tuple[float, float]]:
@@ -85,17 +86,21 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def heat_map_cell(cell: Cell) -> dict[str, str]:
-    """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size."""
+def heat_map_cell(cell: Cell) -> dict[str, Any]:
+    """A cell of the heat map: text, colours, and a title with gap, interval if there is one, floor and sample size.
+
+    after: the ratio with the named effects in the model, where the cell stands out without or with them, else "";
+    worse: whether it got worse with them.
+    """
     times, stands_out = cell.ratio, summary.stands_out(cell)
     shade = next(s for s in SHADES if times >= s.least) if stands_out else AT_FLOOR
     flights = f"{cell.flights} flight{'s' * (cell.flights != 1)}"
     title = "; ".join([in_words(cell), ", ".join(filter(None, [
         f"interval {interval(cell)}" if interval(cell) else "", f"floor {short(cell.floor)} {cell.unit}",
         f"{cell.blocks} blocks of {flights}" if cell.blocks else flights]))])
-    after = "" if cell.after is None or not stands_out else _times(cell.ratio_after)
-    return {"text": _times(times), "colour": shade.background,
-            "ink": shade.ink, "title": title, "after": after}
+    has_after = cell.after is not None and (stands_out or summary.stays(cell))
+    return {"text": _times(times), "colour": shade.background, "ink": shade.ink, "title": title,
+            "after": _times(cell.ratio_after) if has_after else "", "worse": summary.got_worse(cell)}
 
 
 def _times(ratio: float) -> str:
@@ -120,6 +125,16 @@ def order_of_largest(cells: Sequence[Cell], headline: Cell | None = None) -> str
         parts.append(f"The {'others' if parts else 'cells'} stand out, the surest first: by the lower end of the gap's "
                      "interval over the upper end of the floor's.")
     return " ".join(parts)
+
+
+def remaining_to_name(remaining: Sequence[Cell], headline: Cell | None) -> list[Cell]:
+    """Of the cells that stay over the floor, largest first: the first, then those others that concern the answer.
+
+    The latter are the cells that got worse with the named effects, and those of the headline's channel.
+    """
+    more = [c for c in remaining[MOST_REMAINING:]
+            if summary.got_worse(c) or (headline is not None and c.channel == headline.channel)]
+    return [*remaining[:MOST_REMAINING], *more[:MOST_REMAINING]]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:

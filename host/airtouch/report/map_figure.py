@@ -48,7 +48,7 @@ def _draw_platform(ax: Axes, platform: Platform) -> None:
     if platform.outline is not None:
         ax.add_patch(patch_from_polygon(platform.outline, facecolor=GREEN, alpha=0.12, lw=0, label="platform"))
         band = platform.outline.boundary.buffer(2 * platform.sigma_m)
-        ax.add_patch(patch_from_polygon(band, facecolor=GREEN, alpha=0.15, lw=0))
+        ax.add_patch(patch_from_polygon(band, facecolor=GREEN, alpha=0.15, lw=0, label="outline, ±2 sigma"))
         ax.plot(*np.array(platform.outline.exterior.coords).T, color=GREEN, lw=1.6, label="outline")
     elif all(isinstance(side, Point) for side in sides):
         strip = _strip(*(np.array(side.coords[0]) for side in sides))

@@ -8,16 +8,16 @@ from scipy.signal import butter, sosfiltfilt
 
 from airtouch.gap.answer.pictures import MOST_SPECTRA, pictures_of
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.nominal.build_study import sensor_noise
+from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import NamedEffect, Quantity
-from airtouch.gap.signals.channels import COLUMN, COUNT, angular_acceleration
-from airtouch.gap.signals.spectra import AIR, frequencies
+from airtouch.gap.signals.channels import CHANNELS, COLUMN, COUNT, angular_acceleration
+from airtouch.gap.signals.spectra import AIR, frequencies, starts
 from airtouch.gap.signatures.candidates import term_of, terms
 from airtouch.gap.study import Study
 from airtouch.gap.where.gap_map import gap_map
 from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
-from gap_flights import VEHICLE, flight, noise
+from gap_flights import VEHICLE, flight, fly, noise
 from hovers import FLOOR, LOUDNESS, hover
 from made_diagnosis import cell
 
@@ -182,21 +182,38 @@ def test_spectrum_before_is_the_mean_power_of_white_noise():
     assert spectrum.before[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * np.mean([0.1 ** 2, 0.3 ** 2]), rel=0.05)
 
 
-@pytest.mark.parametrize(("blocks", "rise"), [(8, 1.0), (9, LOUDNESS ** 2)])
-def test_floor_of_a_spectrum_is_measured_where_nine_blocks_are_known_and_the_sensors_noise_where_not(blocks, rise):
-    """The floor of this study is twice the declared noise."""
-    study = replace(FLOOR, floor=replace(FLOOR.floor, block_counts={AIR: blocks}), nominal_count=1)
-    (spectrum,) = pictures(hover(1, length_s=SECONDS), study=study).spectra
-    declared = 2.0 * PERIOD_S * sensor_noise(VEHICLE)[COLUMN["force_x"]] ** 2
-    np.testing.assert_allclose(spectrum.floor[1:-1], rise * declared, rtol=1e-6)
+@pytest.mark.parametrize(("blocks", "measured"), [(8, False), (9, True)])
+def test_floor_of_a_spectrum_is_the_nominal_power_where_nine_blocks_are_known_and_the_sensors_noise_where_not(
+        blocks, measured):
+    """Of white noise the power is 2 rms^2 T; nominal flights here have much more than the sensors' own."""
+    seconds = {8: 11.6, 9: 12.9}[blocks]
+    nominal = flight(seconds, noise(seconds, 0.5, 7))
+    assert len(starts(nominal, AIR)) == blocks
+    (spectrum,) = pictures(hover(1, length_s=SECONDS), nominal=[nominal]).spectra
+    rms = 0.5 if measured else sensor_noise(VEHICLE)[COLUMN["force_x"]]
+    assert spectrum.floor[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * rms ** 2, rel=0.25)
 
 
-def test_a_command_has_no_floor_where_no_nominal_flights_give_one(monkeypatch):
-    """The noise of the sensors, which stands for them, is not in a command."""
+def test_spectra_of_a_nominal_flight_lie_at_their_floor():
+    """Of one that is none of those that the floor is of, in every channel: force, torque, rates and commands."""
+    *nominal, other = fly(5, 5)
+    study = declared_study(VEHICLE, nominal)
+    assert study.response is not None
+    for channel in CHANNELS:
+        (spectrum,) = pictures(other, nominal=nominal, study=study, cells=[cell(channel.name, "hover", 1.0)]).spectra
+        for low, high in ((2.0, 6.0), (6.0, 12.0), (12.0, 25.0)):
+            band = (frequencies(AIR) >= low) & (frequencies(AIR) < high)
+            assert 0.5 < spectrum.before[band].mean() / spectrum.floor[band].mean() < 2.0, (channel.name, low)
+
+
+def test_a_command_has_the_floor_of_nominal_flights_and_none_without_them(monkeypatch):
+    """The noise of the sensors, which stands for them, is not in a command. Its power here is 2 T."""
     monkeypatch.setattr(Study, "residual", lambda *_: np.random.default_rng(0).normal(size=(len(TIME_S), COUNT)))
-    force, command = pictures(hover(1, length_s=SECONDS),
-                              cells=[cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]).spectra
+    flown, cells = hover(1, length_s=SECONDS), [cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]
+    force, command = pictures(flown, cells=cells).spectra
     assert force.floor is not None and command.channel == "command_yaw" and command.floor is None
+    _, command = pictures(flown, cells=cells, nominal=[flown]).spectra
+    assert command.floor[2:-1].mean() == pytest.approx(2.0 * PERIOD_S, rel=0.25)
 
 
 def test_spectrum_after_lacks_the_power_of_a_mean_effect():
@@ -209,13 +226,26 @@ def test_spectrum_after_a_random_effect_is_near_the_floor():
     louder = terms("imu_noise")[0].fitted(np.ones(1))
     factor = louder.values["factor"]
     noisy_flight = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
-    curves = pictures(noisy_flight, effects=[louder])
+    curves = pictures(noisy_flight, effects=[louder], nominal=[hover(2, length_s=120.0)])
     (spectrum,) = curves.spectra
     above = slice(2, -1)
     assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
     off = np.abs(spectrum.after - spectrum.floor)[above].mean()
     assert off < 0.3 * (spectrum.before - spectrum.floor)[above].mean()
     assert curves.random and not pictures(noisy_flight, effects=[bias(0.4)]).random
+
+
+def test_torque_after_noise_of_the_imu_is_near_the_floor():
+    """In a closed loop, where commands answer the gyro and its response is known: as much as is added is taken off."""
+    nominal, (louder,) = fly(4, 5), [terms("imu_noise")[0].fitted(np.ones(1))]
+    noisy_flights = fly(3, 11, [("imu_noise", dict(louder.values))])
+    for axis in "xyz":
+        (spectrum,) = pictures(*noisy_flights, nominal=nominal, study=declared_study(VEHICLE, nominal),
+                               effects=[louder], cells=[cell(f"torque_{axis}", "hover", 1.0)]).spectra
+        for low, high in ((2.0, 6.0), (6.0, 12.0), (12.0, 25.0)):
+            band = (frequencies(AIR) >= low) & (frequencies(AIR) < high)
+            before, after = (p[band].mean() / spectrum.floor[band].mean() for p in (spectrum.before, spectrum.after))
+            assert before > 5.0 and 0.5 < after < 2.0
 
 
 def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():

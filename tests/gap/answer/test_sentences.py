@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from airtouch.gap.answer.sentences import sentences
-from airtouch.gap.result import FITTED, HELD_OUT, REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity
+from airtouch.gap.result import FITTED, HELD_OUT, REST_OF_FLIGHT, NamedEffect, OpenCell, Quantity, RotorSet
 from airtouch.gap.where import summary
 from made_diagnosis import cell, diagnosis
 
@@ -66,6 +66,15 @@ def test_weak_motors_are_named_with_their_rotors():
     weak = [NamedEffect("weak_motor", {"rotor": Quantity(i)}) for i in (1, 2)]
     sentence = sentences(diagnosis([cell("torque_x", "hover", 1.0, after=0.1)], effects=weak))[1]
     assert sentence == "Its cause is weak motor of rotor 1 (probability 93%), with weak motor of rotor 2 beside it."
+
+
+@pytest.mark.parametrize(("rotors", "words"), [((1,), "rotor 1"), ((1, 3), "rotors 1 and 3")])
+def test_a_weak_motor_without_a_gyro_has_the_probability_of_its_rotors_too(rotors, words):
+    """That of the effect is of all sets of rotors together."""
+    one = diagnosis(effects=tuple(NamedEffect("weak_motor", {"rotor": Quantity(float(r))}) for r in rotors))
+    first = replace(one.ranking[0], rotor_sets=(RotorSet(rotors, 0.42), RotorSet((4,), 0.22), RotorSet((2,), 0.1)))
+    sentence = sentences(replace(one, ranking=(first, *one.ranking[1:])))[1]
+    assert sentence.startswith(f"Its cause is weak motor (probability 93%), most likely of {words} (42%)")
 
 
 def test_cells_that_got_worse_are_counted():

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.balance import balance_result
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import commanded_change, hypotheses
-from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities
+from airtouch.gap.balance.hover_posterior import alike, answer_of, probabilities, rotor_sets_of
 from airtouch.gap.balance.hover_ranking import closes_too_little, ranking_of, with_names_withdrawn
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
@@ -24,6 +25,33 @@ def test_the_hypotheses_of_a_name_count_together():
     named = [SimpleNamespace(name=n) for n in ("weak_motor", "weak_motor", "mass")]
     evidence = Evidence(np.log([1.0, 1.0, 2.0]) + 900.0, [])
     assert probabilities(evidence, named) == pytest.approx({"weak_motor": 0.5, "mass": 0.5})
+
+
+def rotors(*numbers):
+    """A hypothesis of weak rotors."""
+    return SimpleNamespace(name="weak_motor", effects=[("weak_motor", {"rotor": [float(n)]}) for n in numbers])
+
+
+def test_each_set_of_rotors_has_its_own_probability():
+    """Odds of 10, 20, 12 and 8 of weak motors, and 50 of a weight: 0.5 is a weak motor, and 0.2 the likeliest set."""
+    named = [rotors(1), rotors(4), SimpleNamespace(name="mass"), rotors(1, 3), rotors(2)]
+    sets = rotor_sets_of(Evidence(np.log([10.0, 20.0, 50.0, 12.0, 8.0]) - 900.0, []), named, 0.5)
+    assert [s.rotors for s in sets] == [(4,), (1, 3), (1,), (2,)]
+    assert [s.probability for s in sets] == pytest.approx([0.2, 0.12, 0.1, 0.08])
+    assert balance_result.other_rotors(sets) == [balance_result.OTHER_ROTORS.format("rotors 1 and 3 (12%)")]
+    assert balance_result.other_rotors(sets[:1]) == balance_result.other_rotors(()) == []
+
+
+def test_the_rotors_of_an_answer_are_the_likeliest_set():
+    """A fifth more of rotor 2 alone: no set of others competes with it, and all of them are the weak motor."""
+    nominal, weak = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(4)
+    result = balance_result.diagnosis([replace(weak, pwm=weak.pwm * [1.0, 1.2, 1.0, 1.0])], nominal, VEHICLE)
+    row = result.plain()["ranking"][0]
+    assert len(row["rotor_sets"]) == 10 and row["rotor_sets"][0]["rotors"] == [2]
+    assert sum(s["probability"] for s in row["rotor_sets"]) == pytest.approx(row["probability"], abs=1e-5)
+    assert not any("rotor_sets" in r for r in result.plain()["ranking"][1:])
+    assert not any("which rotors are weak" in note for note in result.notes)
+    assert "(probability 9" in sentences(result)[1] and ", most likely of rotor 2 (" in sentences(result)[1]
 
 
 @pytest.mark.parametrize(("total", "answer"), [
@@ -142,6 +170,14 @@ def test_where_no_effect_is_named_nothing_closes_the_gap():
     assert "measured" not in shrink["weak_motor"]
 
 
+def test_where_every_effect_is_left_out_none_is_said_to_fail():
+    nominal, odd = [hovering(seed) for seed in (1, 2, 3)], hovering(4)
+    result = balance_result.diagnosis([replace(odd, pwm=odd.pwm * [0.6, 1.3, 1.3, 0.8])], nominal, VEHICLE,
+                                      without=("weak_motor", "mass", "com_offset", "slung_load"))
+    assert result.verdict == "unknown" and result.notes[0].endswith("; no effect was tried")
+    assert "no effect was tried" in sentences(result)[1] and "explains" not in sentences(result)[1]
+
+
 def test_a_name_that_leaves_the_gap_as_it_is_is_withdrawn():
     """Two rotors need more and a third one less, which no candidate makes: the likeliest closes hardly anything."""
     nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.98), (2, 1.0), (3, 1.02))], hovering(4)
@@ -181,13 +217,29 @@ def test_an_effect_that_makes_a_gap_at_the_floor_larger_closes_too_little(after,
     assert closes_too_little(Closure(1.03, after, Quantity(0.0))) == too_little
 
 
-def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor():
+@pytest.mark.parametrize("seed", range(4, 12))
+def test_a_flight_that_is_balanced_but_unsteady_has_no_weak_motor(seed):
     """Commands twice as unsteady about the nominal mean: a weak motor is likely by that, and makes the gap larger."""
-    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(4)
+    nominal, odd = [hovering(seed, lift) for seed, lift in ((1, 0.99), (2, 1.0), (3, 1.01))], hovering(seed)
     mean = odd.pwm.mean(axis=0)
     result = balance_result.diagnosis([replace(odd, pwm=mean + 2.0 * (odd.pwm - mean))], nominal, VEHICLE)
     assert (result.verdict, result.effects) == ("unknown", ())
     assert next(r for r in result.ranking if r.name == "weak_motor").probability == 0.0
+
+
+@pytest.mark.parametrize(("before", "by_balance", "names"), [
+    (1.0, {"none": 0.5, "weak_motor": 0.3, "mass": 0.1, "com_offset": 0.1}, ["weak_motor", "mass"]),
+    (1.0, {"none": 0.25, "weak_motor": 0.2, "mass": 0.3, "com_offset": 0.25}, ["weak_motor"]),
+    (1.0, {"none": 0.2, "weak_motor": 0.3, "mass": 0.3, "com_offset": 0.2}, []),
+    (STANDS_OUT + 0.1, {"none": 0.5, "weak_motor": 0.3, "mass": 0.1, "com_offset": 0.1}, [])])
+def test_at_the_floor_an_effect_is_named_only_if_the_balance_makes_it_likelier_than_none(before, by_balance, names):
+    """A weight's two forms count together."""
+    total = {"none": 0.05, "weak_motor": 0.6, "mass": 0.2, "com_offset": 0.1, "unknown": 0.05}
+    closures = {n: Closure(before, 0.5, Quantity(1.0)) for n in total}
+    probability_of, withdrawn = with_names_withdrawn(total, closures, by_balance)
+    assert withdrawn == names and sum(probability_of.values()) == pytest.approx(1.0)
+    rows = {r.name: r.why for r in ranking_of(answer_of(probability_of)[0], probability_of, closures, withdrawn)}
+    assert all(rows[n].startswith("the gap is at its floor") for n in names)
 
 
 CLOSES = {"none": 0.0, "weak_motor": 0.74, "mass": 0.23, "slung_load": 0.1, "com_offset": 0.2, "unknown": 0.6}
@@ -204,7 +256,7 @@ EVIDENCE = {"none": 0.05, "weak_motor": 0.3, "mass": 0.35, "slung_load": 0.15, "
 def test_a_name_withdrawn_leaves_the_answer_to_the_next_that_closes_enough(closes, evidence, names, left):
     """Shares of what is left, by hand; where no effect comes next, `unknown` has what was withdrawn."""
     closures = {n: Closure(3.0, 1.0, Quantity(c)) for n, c in {**CLOSES, **closes}.items()}
-    probability_of, withdrawn = with_names_withdrawn({**EVIDENCE, **evidence}, closures)
+    probability_of, withdrawn = with_names_withdrawn({**EVIDENCE, **evidence}, closures, {})
     assert withdrawn == names
     assert {n: p for n, p in probability_of.items() if p} == pytest.approx(left)
 

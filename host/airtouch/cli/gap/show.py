@@ -73,8 +73,8 @@ def diagnosis(screen: Console, result: Diagnosis) -> None:
     for effect in result.effects:
         screen.print("  " + words.effect_in_words(effect))
     table = Table(title="Ranking", title_justify="left", caption_justify="left",
-                  caption="shrink: part of the gap above the floor that goes away on data held out (without a gyro: "
-                          "on those fitted to), with its 90 % interval; -: not measured")
+                  caption="shrink: part of the gap above the floor that goes away on "
+                          f"{words.data_of_shrink(result)}, with its 90 % interval; -: not measured")
     for name in ("candidate", "probability", "shrink"):
         table.add_column(name, justify="left" if name == "candidate" else "right", no_wrap=True)
     table.add_column("why it is not the answer", ratio=1)

@@ -28,8 +28,8 @@ MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; ch
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
 #: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
 LEAST_CUTOFF_HZ = 2.0
-#: blocks of nominal flights from which on the power measured there is drawn as the floor of a spectrum; with fewer the
-#: declared noise of the sensors is; chosen. A smaller number draws a floor that is itself noise
+#: blocks of nominal flights from which on the power of their residual is drawn as the floor of a spectrum; with fewer
+#: the declared noise of the sensors is; chosen. A smaller number draws a floor that is itself noise
 FEWEST_NOMINAL_BLOCKS = 9
 LEAST_FLOOR_POWER = 1e-12  #: least power of a floor that is shown, in a channel's unit squared/Hz; chosen
 
@@ -70,7 +70,8 @@ class Signal:
 class Spectrum:
     """Power spectral densities (bins,) of a channel's residual in the air, unit squared/Hz; after as in `Signal`.
 
-    floor: None where nothing is known of it, as of a command without enough nominal flights.
+    floor: mean power of the same residual of nominal flights, or the noise of the sensors where there are too few; None
+    where that is nothing, as of a command.
     """
 
     channel: str
@@ -115,7 +116,7 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
-                    _spectra(study, residuals, effects, channels), commands, bool(random_of(effects)))
+                    _spectra(study, residuals, nominal, effects, channels), commands, bool(random_of(effects)))
 
 
 def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
@@ -189,19 +190,31 @@ def _band_passed(flight: Flight, values: np.ndarray, band_hz: tuple[float, float
     return out
 
 
-def _spectra(study: Study, residuals: Sequence[FlightResidual], effects: Sequence[Term], channels: Sequence[str],
-             ) -> tuple[Spectrum, ...]:
+def _spectra(study: Study, residuals: Sequence[FlightResidual], nominal: Sequence[Flight], effects: Sequence[Term],
+             channels: Sequence[str]) -> tuple[Spectrum, ...]:
     """The spectra of channels in the air, means over the flights that have the channel; none where none has."""
     airborne = [r for r in residuals if len(starts(r.flight, AIR))]
     if not airborne:
         return ()
-    floor = np.maximum(study.floor.power[AIR] if study.measured_blocks(AIR) >= FEWEST_NOMINAL_BLOCKS else
-                       sensor_power(sensor_noise(study.vehicle), AIR), LEAST_FLOOR_POWER)
+    floor = _floor_power(study, nominal)
     before = _mean_of_known([_power(r.flight, r.before) for r in airborne])
     after = _power_after(study, airborne, effects, floor) if effects else None
     return tuple(Spectrum(name, CHANNELS[c].unit, before[:, c], None if after is None else after[:, c],
                           floor[:, c] if (floor[1:, c] > LEAST_FLOOR_POWER).any() else None)
                  for name, c in ((name, COLUMN[name]) for name in channels) if np.isfinite(before[:, c]).all())
+
+
+def _floor_power(study: Study, nominal: Sequence[Flight]) -> np.ndarray:
+    """Floor (bins, COUNT) of the spectra: the mean power of the residual of nominal flights, as the curves have it.
+
+    It is not that of `Study.floor`, in which torque is what the response of nominal flights leaves.
+    """
+    floor = sensor_power(sensor_noise(study.vehicle), AIR)
+    airborne = [f for f in nominal[:MOST_FLIGHTS] if len(starts(f, AIR))]
+    if sum(len(starts(f, AIR)) for f in airborne) >= FEWEST_NOMINAL_BLOCKS:
+        measured = _mean_of_known([_power(f, study.residual(f)) for f in airborne])
+        floor = np.where(np.isfinite(measured), measured, floor)
+    return np.maximum(floor, LEAST_FLOOR_POWER)
 
 
 def _mean_of_known(powers: Sequence[np.ndarray]) -> np.ndarray:
@@ -230,7 +243,9 @@ def _power_after(study: Study, residuals: Sequence[FlightResidual], effects: Seq
     random = random_of(effects)
     if not random:
         return _mean_of_known(powers)
+    # as the curves have it: with their floor, and torque as the replay leaves it
+    replayed = replace(study, response=None, floor=replace(study.floor, power={**study.floor.power, AIR: floor}))
     of_random = [sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
-                 for data in (Data(study, [r.flight]) for r in residuals)]
+                 for data in (Data(replayed, [r.flight]) for r in residuals)]
     expected = _mean_of_known([np.where(np.isfinite(p), x, np.nan) for p, x in zip(powers, of_random, strict=True)])
     return _mean_of_known(powers) * floor / (floor + expected)

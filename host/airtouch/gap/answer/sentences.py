@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from airtouch.gap.answer.words import joined, name_in_words, quantity
-from airtouch.gap.result import FITTED, REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell
+from airtouch.gap.answer.words import joined, name_in_words, quantity, rotors_in_words
+from airtouch.gap.result import FITTED, REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell, RankedCandidate
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.signatures.candidates import is_random, random_of, terms_of
 from airtouch.gap.signatures.signature import OVERHEAD
@@ -55,6 +55,8 @@ def _which(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"No unmodelled effect stands out (probability {probability})."
     if diagnosis.verdict == "unknown":
+        if diagnosis.ranking and all(r.name in ("none", "unknown") for r in diagnosis.ranking):
+            return f"Something acts (probability {probability}), but no effect was tried."
         near = next((r for r in diagnosis.ranking if r.name not in ("none", "unknown")
                      and r.probability >= LEAST_PROBABILITY), None)
         return (f"No known effect explains it (probability {probability})"
@@ -64,11 +66,20 @@ def _which(diagnosis: Diagnosis) -> str:
     beside = f", with {joined(others)} beside it" if others else ""
     caveat = _without_baseline(diagnosis)
     cause = f"Its cause is {first} (probability {probability}){beside}"
+    if diagnosis.ranking and diagnosis.ranking[0].rotor_sets:
+        cause = _cause_by_rotors(diagnosis.ranking[0])
     if cell is None or not summary.stands_out(cell):
         return f"{cause}: so say all cells together.{caveat}"
     if cell.after is not None and not summary.shrinks(cell):
         return f"{cause}: so say all cells together, though {they} not shrink this one, nor halve any other.{caveat}"
     return f"{cause}.{caveat}"
+
+
+def _cause_by_rotors(answer: RankedCandidate) -> str:
+    """The cause with its probability, whichever rotors it is of, and the likeliest rotors with theirs."""
+    likeliest = answer.rotor_sets[0]
+    return (f"Its cause is {name_in_words(answer.name)} (probability {answer.probability:.0%}), most likely of "
+            f"{rotors_in_words(likeliest.rotors)} ({likeliest.probability:.0%})")
 
 
 def _without_baseline(diagnosis: Diagnosis) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-from airtouch.gap.result import REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
+from airtouch.gap.result import FITTED, REST_OF_FLIGHT, Diagnosis, NamedEffect, OpenCell, Quantity, RankedCandidate
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where.cell_words import band_in_words
 
@@ -46,6 +46,11 @@ def name_in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def rotors_in_words(rotors: Sequence[int]) -> str:
+    """Rotors as a phrase: `rotor 1`, `rotors 1 and 3`."""
+    return f"rotor{'s' * (len(rotors) > 1)} {joined([str(r) for r in rotors])}"
+
+
 def effect_in_words(effect: NamedEffect) -> str:
     """The effect with its parameters, as `weak_motor: rotor 3, thrust_loss 0.11 (0.09 to 0.13)`, and when it acts."""
     when = seconds_in_words(effect)
@@ -85,3 +90,10 @@ def nearest_in_words(diagnosis: Diagnosis) -> list[str]:
 def leading(ranking: Sequence[RankedCandidate]) -> list[RankedCandidate]:
     """The candidates that are shown: the first MOST_RANKED, and `none` and `unknown` wherever they are."""
     return [r for i, r in enumerate(ranking) if i < MOST_RANKED or r.name in ("none", "unknown")]
+
+
+def data_of_shrink(diagnosis: Diagnosis) -> str:
+    """On what data the shrink of a candidate is measured: of a passing effect, which has no halves, on all."""
+    if diagnosis.judged_on == FITTED and not any(e.seconds for e in diagnosis.effects):
+        return "data that it is fitted to"
+    return "data held out (of a passing effect: on those that it is fitted to)"

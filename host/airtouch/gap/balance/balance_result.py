@@ -11,14 +11,16 @@ import numpy as np
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.shrink import fraction_closed
-from airtouch.gap.answer.words import joined
+from airtouch.gap.answer.words import joined, rotors_in_words
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
 from airtouch.gap.balance.hover_hypotheses import hypotheses
 from airtouch.gap.balance.hover_pattern import hover_pattern, share_not_logged
 from airtouch.gap.balance.hover_posterior import (
+    COMPETES,
     HIGH,
     LOW,
     OTHER_WEIGHT,
+    WEAK_MOTOR,
     Likeliest,
     alike,
     answer_of,
@@ -26,12 +28,13 @@ from airtouch.gap.balance.hover_posterior import (
     likeliest_of,
     probabilities,
     quantile,
+    rotor_sets_of,
 )
 from airtouch.gap.balance.hover_ranking import NO_EFFECTS, ranking_of, with_names_withdrawn
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity
+from airtouch.gap.result import FITTED, Closure, Control, Diagnosis, OverallGap, Quantity, RotorSet
 from airtouch.gap.signals.spectra import MOST_LOST
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import BASELINE, Cell, GapMap
@@ -43,8 +46,8 @@ BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells nam
 #: (`signature.WRONG` has others)
 WRONG_IN_HOVER = ("com_offset", "slung_load", "mass", "weak_motor")
 WRONG_BELOW = 0.1  #: probability below which an effect is surely wrong; chosen
-NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; the only "
-           "effects tried are {}")
+NO_GYRO = ("no gyro: judged by the mean balance of the motors over all that is flown, moves included{}; {}")
+TRIED, NONE_TRIED = "the only effects tried are {}", "no effect was tried"  #: in NO_GYRO
 UNSTEADINESS = ", and how unsteady it is"  #: in NO_GYRO, where that is judged
 OWN_NOT_TRIED = "effects of your own are not tried where flights have no gyro and hovers are judged: {}"
 NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown unlike the other flights, and a wrong "
@@ -52,6 +55,8 @@ NOT_LOGGED = ("{:.0%} of what is flown was not logged; what is left may be flown
 NO_VOLTAGE = "no battery voltage in some flights: their lift may differ for that alone"
 NO_VELOCITY = ("no velocity in some flights: how unsteady flights are is not judged, as it depends on how the "
                "estimated velocity is corrected")
+
+OTHER_ROTORS = "which rotors are weak is not sure: instead of those named it may be {}"
 
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
@@ -79,21 +84,25 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     by_evidence = probabilities(judged, candidates)
     fits = {name: likeliest_of(name, candidates, judged) for name in by_evidence}
     closures = {name: _closure(gap, base, fit) for name, fit in fits.items()}
-    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures)
+    by_balance = probabilities(evidence(np.append(gap, [np.nan, np.nan]), base, candidates), candidates)
+    probability_of, withdrawn = with_names_withdrawn(by_evidence, closures, by_balance)
     first, probability = answer_of(probability_of)
     verdict = first if first in NO_EFFECTS else "effect"
 
     effects = effects_of(fits[first]) if verdict == "effect" else []
     cells = _cells(gap, base, vehicle, fits[first] if effects else None, len(flights))
+    ranking = ranking_of(first, probability_of, closures, withdrawn)
+    if first == WEAK_MOTOR:
+        ranking[0] = replace(ranking[0], rotor_sets=rotor_sets_of(judged, candidates, ranking[0].probability))
     indistinguishable = alike([e.name for e in effects], probability_of, first, probability)
     headline = summary.headline(cells, bool(effects))
     answer = Diagnosis(
-        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking_of(first, probability_of, closures, withdrawn)),
+        verdict=verdict, effects=tuple(effects), ranking=tuple(ranking),
         indistinguishable=indistinguishable, where=cells, gap=_gap(verdict, closures[first]),
         shrink=closures[first].shrink if verdict == "effect" else None, judged_on=FITTED,
         control=control_of(by_evidence, [e.name for e in effects], closures) if verdict == "effect" else None,
         notes=_notes(voltage, bool(np.isfinite(difference).all()), list(probability_of),
-                     [*notes, *_not_logged([*flights, *nominal])]),
+                     [*other_rotors(ranking[0].rotor_sets), *notes, *_not_logged([*flights, *nominal])]),
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
@@ -166,9 +175,17 @@ def _notes(voltage: bool, velocity: bool, tried: Sequence[str], notes: Sequence[
     voltage, velocity: whether all flights log that of the battery, and their own; tried: names of the candidates.
     """
     effects, own = [n for n in tried if n not in NO_EFFECTS], [n for n in EFFECTS if n not in NAMES]
-    return (NO_GYRO.format(UNSTEADINESS if velocity else "", joined(effects)),
+    which = TRIED.format(joined(effects)) if effects else NONE_TRIED
+    return (NO_GYRO.format(UNSTEADINESS if velocity else "", which),
             *([OWN_NOT_TRIED.format(joined(own))] if own else []), *notes,
             *([] if voltage else [NO_VOLTAGE]), *([] if velocity else [NO_VELOCITY]))
+
+
+def other_rotors(rotor_sets: Sequence[RotorSet]) -> list[str]:
+    """A note on the sets of rotors that COMPETE with the likeliest, the first; none where there are none."""
+    others = [s for s in rotor_sets[1:] if s.probability > COMPETES * rotor_sets[0].probability]
+    words = " or ".join(f"{rotors_in_words(s.rotors)} ({s.probability:.0%})" for s in others)
+    return [OTHER_ROTORS.format(words)] if others else []
 
 
 def _not_logged(flights: Sequence[Flight]) -> list[str]:

@@ -17,8 +17,8 @@ from airtouch.logs.flight_log import VELOCITY
 from airtouch.logs.segments import runs
 from airtouch.vehicle import Vehicle
 
-#: thrust at a PWM grows with voltage to this power: 1.2 between the nominal flights of CrazyPAD, 1.0 within one
-#: (host/docs/gap-crazypad.md)
+#: thrust at a PWM grows with voltage to this power; chosen: the lift commanded falls with voltage to the power 1.1
+#: between CrazyPAD's four nominal flights of E8, 1.2 between three of E9 (least squares of the logarithms)
 VOLTAGE_EXPONENT = 1.2
 VOLTAGE_SAMPLES = 20  #: standard deviation of the Gaussian that smooths the voltage, samples (0.2 s); chosen
 SETTLE_S = 0.8  #: s at either end of a stretch in the air that do not count; chosen
@@ -103,8 +103,8 @@ def stretches_in_air(flight: Flight) -> list[tuple[int, int]]:
     than MOST_BRIDGED samples that were not logged, at which a stretch is split: a straight line is steadier than any
     flight. A stretch has LEAST_S with its holes, and the flight without them; parts may be shorter, as balance and
     powers are not the same all along a flight. The numbers of a pattern are means over that, of a hover only where the
-    flight is one. CrazyPAD's flights are not: in 16 of the 91 the phase hover has 10 to 26 % of it, and cruise most of
-    the rest, at 0.2 m/s. So nominal flights must be flown alike.
+    flight is one. CrazyPAD's 91 flights are not: the phase hover has 7 to 27 % of it, 22 % in the median, and cruise
+    61 to 81 %, at 0.4 m/s. So nominal flights must be flown alike.
     """
     logged = np.ones(len(flight), bool)
     for a, b in runs(flight.not_logged):

@@ -7,13 +7,14 @@ import numpy as np
 
 from airtouch.gap.balance.hover_balance import Evidence
 from airtouch.gap.balance.hover_hypotheses import Hypothesis
-from airtouch.gap.result import NamedEffect, Quantity
+from airtouch.gap.result import NamedEffect, Quantity, RotorSet
 from airtouch.gap.signatures.alike import names_alike
 from airtouch.simulation.effects import Parameter, get
 
 LOW, HIGH = 0.05, 0.95  #: quantiles between which the 90 % intervals lie
 LEAST_SHIFT = 0.9  #: posterior probability of an off-centre weight's side, for com_offset to be named; chosen
 COMPETES = 0.5  #: of the answer's probability, from which on another name counts as one that fits alike; chosen
+WEAK_MOTOR = "weak_motor"  #: the name of hypotheses that differ in their rotors
 #: the two names of a weight: on the vehicle; so far off centre that its own mass does not show
 WEIGHT, OFF_CENTRE = "mass", "com_offset"
 OTHER_WEIGHT = {WEIGHT: OFF_CENTRE, OFF_CENTRE: WEIGHT}  #: the other name of each
@@ -44,6 +45,15 @@ def probabilities(evidence: Evidence, candidates: Sequence[Hypothesis]) -> dict[
     chance /= chance.sum()
     return {name: float(sum(c for c, h in zip(chance, candidates, strict=True) if h.name == name))
             for name in dict.fromkeys(h.name for h in candidates)}
+
+
+def rotor_sets_of(evidence: Evidence, candidates: Sequence[Hypothesis], probability: float) -> tuple[RotorSet, ...]:
+    """The probability of each set of weak rotors, likeliest first; they add up to `probability`, that of weak_motor."""
+    log_of = {tuple(int(drawn["rotor"][0]) for _, drawn in h.effects): log
+              for h, log in zip(candidates, evidence.log, strict=True) if h.name == WEAK_MOTOR}
+    chance = {rotors: np.exp(log - max(log_of.values())) for rotors, log in log_of.items()}
+    return tuple(RotorSet(rotors, float(probability * c / sum(chance.values())))
+                 for rotors, c in sorted(chance.items(), key=lambda item: -item[1]))
 
 
 def answer_of(probability_of: Mapping[str, float]) -> tuple[str, float]:

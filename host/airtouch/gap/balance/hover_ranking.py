@@ -7,6 +7,7 @@ from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import Closure, Quantity, RankedCandidate
 
 NO_EFFECTS = ("none", "unknown")  #: candidates that name no effect
+NOT_IN_BALANCE = "the gap is at its floor, and the balance of the motors alone does not speak for it"
 LEAST_PROBABILITY = 1e-12  #: of a candidate that others are so many times more probable than, at least
 
 
@@ -22,15 +23,25 @@ def closes_too_little(closure: Closure) -> bool:
     return closure.shrink.value < LEAST_CLOSED
 
 
-def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
-                         ) -> tuple[dict[str, float], list[str]]:
-    """The probabilities with those of names that close too little at 0, and these names, the likeliest first.
+def balance_does_not_show(name: str, closure: Closure, by_balance: Mapping[str, float]) -> bool:
+    """Whether the gap is at its floor, and the balance alone does not make an effect more probable than none.
 
-    A weight is withdrawn in both forms. If an effect that closes enough is then the likeliest, the others add up to 1;
-    if one of NO_EFFECTS is, `unknown` takes the probability of these names.
+    by_balance: the probabilities without the powers. Unsteadiness alone names nothing: many things shake a vehicle.
+    """
+    return closure.before <= STANDS_OUT and _weights_together(name, by_balance)[name] <= by_balance["none"]
+
+
+def with_names_withdrawn(probability_of: Mapping[str, float], closures: Mapping[str, Closure],
+                         by_balance: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
+    """The probabilities with those of names that are withdrawn at 0, and these names, the likeliest first.
+
+    Those are withdrawn that close too little, or that the balance does not show. by_balance: the probabilities without
+    the powers. A weight is withdrawn in both forms. If an effect that is not withdrawn is then the likeliest, the
+    others add up to 1; if one of NO_EFFECTS is, `unknown` takes the probability of these names.
     """
     probability, withdrawn, withdrawn_probability = dict(probability_of), [], 0.0
-    while (first := answer_of(probability)[0]) not in NO_EFFECTS and closes_too_little(closures[first]):
+    while (first := answer_of(probability)[0]) not in NO_EFFECTS and (
+            closes_too_little(closures[first]) or balance_does_not_show(first, closures[first], by_balance)):
         withdrawn.append(first)
         withdrawn_probability += _weights_together(first, probability)[first]
         probability.update({n: 0.0 for n in (first, OTHER_WEIGHT.get(first)) if n in probability})
@@ -54,6 +65,8 @@ def ranking_of(first: str, probability_of: Mapping[str, float], closures: Mappin
         """Why a candidate is not the answer; empty for the answer."""
         if name == first:
             return ""
+        if name in withdrawn and closures[name].before <= STANDS_OUT:
+            return NOT_IN_BALANCE
         if name in withdrawn:
             return f"closes {max(closures[name].shrink.value, 0.0):.0%} of the gap, too little to be its cause"
         if probability == 0.0 and (other := OTHER_WEIGHT.get(name)) in (first, *withdrawn):
