@@ -3,7 +3,7 @@
 import pytest
 
 from airtouch.detector import best
-from made_flight import SMALL, made_flight
+from made_flight import SMALL, SMALL_SEED, made_flight
 from shared_fixture import once
 
 
@@ -11,4 +11,4 @@ from shared_fixture import once
 def small(tmp_path_factory):
     """A small network, trained on two made flights."""
     pytest.importorskip("tensorflow")
-    return once(tmp_path_factory, "small", lambda: best.fit([made_flight(0), made_flight(1)], seed=3, recipe=SMALL))
+    return once(tmp_path_factory, "small", lambda: best.fit([made_flight(0), made_flight(1)], SMALL_SEED, recipe=SMALL))

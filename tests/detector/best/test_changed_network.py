@@ -1,6 +1,8 @@
 """A network of another graph and with a fourth output is trained, scored, saved and exported, as the page says."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from airtouch.detector import best
 from airtouch.detector.best import batches, export, fit_settings, model, network, operations, outputs, recipe, training
 from airtouch.detector.best.operations import CAUSAL_CONV
 from airtouch.detector.best.outputs import OUTPUTS, Output
+from airtouch.detector.best.quantisation import check_runs_in_c
 from airtouch.detector.best.recipe import CHANNELS, Recipe
+from airtouch.detector.evaluation.data import simulated
 from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError
 from airtouch.reference.motion_channels import NAMES
@@ -20,6 +24,8 @@ from airtouch.reference.networks.int8_network import LayerKind
 from airtouch.reference.networks.stream_graph import StreamLayer
 from made_flight import SMALL, made_flight
 from skips import needs
+
+PAGE = Path(__file__).parents[3] / "host/docs/change-the-network.md"
 
 
 @pytest.fixture
@@ -79,8 +85,9 @@ def test_a_model_of_other_channels_is_refused_though_its_shape_is_the_same(small
 
 @needs("tensorflow")
 @pytest.mark.parametrize("of_layer2, message", [
-    ({"reads": (0, 1)}, "convolutions in a row"), ({"operation": "unknown to C"}, r"layer 2 .* `make setup`")])
-def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_first_step(monkeypatch, of_layer2, message):
+    ({"reads": (0, 1)}, r"reads the last of them\)$"), ({"outputs": 12}, r"layer 3 [^`]*$"),
+    ({"operation": "unknown to C"}, r"layer 2 .* `make setup`")])
+def test_a_network_that_the_built_kernels_do_not_take_is_refused_at_once(monkeypatch, tmp_path, of_layer2, message):
     """A graph of another form, and an arithmetic that the C library was built without."""
     graph = tuple(replace(layer, **of_layer2) if layer.name == "layer2" else layer for layer in SMALL.graph)
     without_c = replace(operations.OPERATIONS[CAUSAL_CONV], kind=LayerKind("new", 99, lambda layer, x: x))
@@ -89,6 +96,22 @@ def test_a_network_that_the_built_kernels_do_not_take_is_refused_before_the_firs
     monkeypatch.setattr(training, "fit", lambda *_, **__: pytest.fail("the training began"))
     with pytest.raises(AirTouchError, match=message):
         best.fit([made_flight()], recipe=SMALL)
+    monkeypatch.setattr(simulated, "training_flights", lambda *_, **__: pytest.fail("flights were simulated"))
+    told = CliRunner().invoke(train.command, ["--simulated", "4", "--out", str(tmp_path / "mine.npz")])
+    assert isinstance(told.exception, AirTouchError) and re.search(message, str(told.exception))
+
+
+def test_layers_of_other_widths_fit_the_kernels_with_the_head_of_the_page(monkeypatch):
+    (line,) = re.findall(r'`(StreamLayer\("layer4", HEAD.*)`', PAGE.read_text(encoding="utf-8"))
+    widths = (SMALL.width, 20, 16, 12)
+    inner = [replace(layer, inputs=before, outputs=after)
+             for layer, before, after in zip(SMALL.graph[1:4], widths[:-1], widths[1:], strict=True)]
+    too_narrow, fits = ((SMALL.graph[0], *inner, head) for head in (SMALL.graph[-1], eval(line, vars(recipe))))
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: too_narrow))
+    with pytest.raises(AirTouchError, match="layer 4 does not fit"):
+        check_runs_in_c(SMALL)
+    monkeypatch.setattr(Recipe, "graph", property(lambda _: fits))
+    check_runs_in_c(SMALL)
 
 
 @pytest.mark.parametrize("change, message", [

@@ -6,6 +6,7 @@ import click
 
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.help import examples
+from airtouch.detector.best import export as best_export
 from airtouch.detector.best import model as best_model
 from airtouch.detector.paper import model as model_file
 from airtouch.detector.paper import rolling
@@ -31,6 +32,7 @@ Trained = model_file.Model | best_model.BestModel
 def command(model: Path | None, vehicle: str | None, out: Path | None, only_check: bool, force: bool) -> None:
     """Write MODEL (.npz; all shipped ones if left out) as C: weights, shapes, scales, golden vectors.
 
+    A MODEL of `best` is first compared with tflite-micro, where that is installed, and refused where a bit differs.
     With --check: exit code 2 and the reason where the folder is not what MODEL exports to: stale, from another
     model, edited, incomplete, or, for the shipped ones, with sources that none of them gives.
     """
@@ -51,12 +53,22 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
             export.check(trained, out, name)
             click.echo(f"{out}: up to date with {trained.metadata['detector']} model {trained.digest[:12]}")
             continue
+        compared = _compared(trained) if model else ""
         for path in export.export(trained, out, name, force):
             click.echo(f"written: {path}")
         click.echo(f"{trained.metadata['detector']} model {trained.digest[:12]}: "
-                   f"{parameter_bytes(trained.int8)} bytes of constants")
+                   f"{parameter_bytes(trained.int8)} bytes of constants{compared}")
     if only_check and shipped:
         export.check_nothing_else(shipped, out)
+
+
+def _compared(trained: Trained) -> str:
+    """What is told of the comparison with tflite-micro, of models of `best`; AirTouchError where it differs."""
+    if not isinstance(trained, best_model.BestModel):
+        return ""
+    windows = best_export.check_against_tflite_micro(trained)
+    return (f"; tflite-micro gives the same bits on {windows} windows" if windows else
+            "; not compared with tflite-micro, which is not installed: pip install '.[test]'")
 
 
 def _load(path: Path) -> Trained:

@@ -18,6 +18,7 @@ from airtouch.cli.shared.options import Finite, seed_option
 from airtouch.cli.shared.typed import typed
 from airtouch.detector import registry
 from airtouch.detector.best import free_air as air
+from airtouch.detector.best.quantisation import check_runs_in_c
 from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.evaluation import crossval, evaluate
 from airtouch.detector.evaluation.data import dataset
@@ -86,6 +87,8 @@ def command(flights: tuple[Path, ...], detector: str, out: Path, epochs: int | N
     what: dict[str, Any] | None = None
     if start:
         options["start"] = module.load(start)
+    if detector == "best":
+        check_runs_in_c(_recipe(options))  # before flights are read or simulated, which takes long
     if vehicle:
         options["vehicle"] = vehicles.load(vehicle)
     if free_air:
@@ -158,8 +161,13 @@ def _arm_pwm(detector: str, options: dict[str, Any]) -> float | None:
     """
     if detector != "best":
         return None
-    craft, start = options.get("vehicle"), options.get("start")
-    return craft.arm_pwm if craft else (start.recipe if start else Recipe()).motion.arm_pwm
+    craft = options.get("vehicle")
+    return craft.arm_pwm if craft else _recipe(options).motion.arm_pwm
+
+
+def _recipe(options: dict[str, Any]) -> Recipe:
+    """Of `best`: the recipe of --start, else that of this version."""
+    return options["start"].recipe if "start" in options else Recipe()
 
 
 def _read(paths: tuple[Path, ...], spare: int, arm_pwm: float | None) -> tuple[list[FlightLog], int]:

@@ -6,6 +6,7 @@ from airtouch.detector.best.model import BestModel
 from airtouch.detector.best.outputs import OUTPUTS
 from airtouch.detector.shared.c_source import CONST, CONST_DEFAULT, float_literal, golden_header, golden_source, layer
 from airtouch.detector.shared.vehicle_header import name_of, thrust_text
+from airtouch.errors import AirTouchError
 from airtouch.kernels.network import parameter_bytes
 from airtouch.kernels.stream import arena_bytes
 from airtouch.reference.motion_channels import MotionConfig
@@ -13,6 +14,7 @@ from airtouch.reference.networks.int8_network import quantise
 from airtouch.reference.networks.stream_int8 import StreamNetwork, run_stream
 
 GOLDEN = 700  #: samples of the golden flight, more than the network looks back
+COMPARED = 20  #: windows of a comparison with tflite-micro
 PREFIX = "AIRTOUCH_STREAM_GOLDEN"
 
 
@@ -29,12 +31,47 @@ def render(model: BestModel) -> dict[str, str]:
     }
 
 
-def golden_flight(network: StreamNetwork) -> tuple[np.ndarray, np.ndarray]:
-    """int8 samples (GOLDEN, channels) of made-up smooth channels and NumPy's rows (GOLDEN / stride, outputs)."""
-    walk = np.random.default_rng(0).normal(scale=0.3, size=(GOLDEN, network.channels)).cumsum(axis=0)
+def golden_flight(network: StreamNetwork, samples: int = GOLDEN) -> tuple[np.ndarray, np.ndarray]:
+    """int8 samples (samples, channels) of made-up smooth channels and NumPy's rows (samples / stride, outputs)."""
+    walk = np.random.default_rng(0).normal(scale=0.3, size=(samples, network.channels)).cumsum(axis=0)
     first = network.layers[0]
     inputs = quantise(4.0 * np.sin(walk), first.input_scale, first.input_zero_point)
     return inputs, run_stream(network, inputs)
+
+
+def rows_of_tflite_micro(model: BestModel, quantised: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """tflite-micro's int8 outputs (rows, outputs) over the windows of int8 samples (n, channels) that end at the rows.
+
+    Raises ImportError where tflite-micro is not installed.
+    """
+    from tflite_micro import runtime
+
+    length, outputs = model.int8.receptive_samples, []
+    arena = 2**20 + 4 * length * max(layer.outputs for layer in model.int8.graph)
+    interpreter = runtime.Interpreter.from_bytes(model.tflite, arena_size=arena)
+    for end in rows * model.int8.stride + 1:
+        interpreter.set_input(quantised[end - length:end].reshape(1, 1, length, -1), 0)
+        interpreter.invoke()
+        outputs.append(interpreter.get_output(0).ravel())
+    return np.array(outputs)
+
+
+def check_against_tflite_micro(model: BestModel) -> int:
+    """On how many windows of made-up samples tflite-micro gives the network's bits; 0 where it is not installed.
+
+    Raises AirTouchError where one differs.
+    """
+    quantised, expected = golden_flight(model.int8, model.int8.receptive_samples + GOLDEN)
+    rows = np.linspace(-(-model.int8.receptive_samples // model.int8.stride), len(expected) - 1, COMPARED).astype(int)
+    try:
+        given = rows_of_tflite_micro(model, quantised, rows)
+    except ImportError:
+        return 0
+    wrong = int((given != expected[rows]).any(axis=1).sum())
+    if wrong:
+        raise AirTouchError(f"the int8 network and tflite-micro differ on {wrong} of {len(rows)} windows: an operation "
+                            "of the network is not the same in both")
+    return len(rows)
 
 
 def _header(model: BestModel) -> str:

@@ -177,7 +177,10 @@ def parse(data: bytes, source: str) -> BestModel:
         positive = (part["scale"] > 0).all() and (part["weight_scale"] > 0).all()
         if not positive or not ((part["zero_point"] >= -128) & (part["zero_point"] <= 127)).all():
             raise AirTouchError(f"{source}: int8 scales or zero points out of range; {archive.REMEDY}")
-    int8 = network_of(layers, recipe)
+    try:
+        int8 = network_of(layers, recipe)
+    except AirTouchError as error:
+        raise AirTouchError(f"{source}: {error}; {archive.REMEDY}") from None
     archive.check_range(int8.layers, source)
     model = BestModel(recipe, {name: arrays[name] for name in floats}, int8,
                         arrays["tflite"].tobytes(), metadata)

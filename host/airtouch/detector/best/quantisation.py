@@ -11,6 +11,7 @@ from airtouch.detector.best.recipe import Recipe
 from airtouch.detector.shared.tensorflow import convert, read_weighted_layers
 from airtouch.errors import AirTouchError
 from airtouch.kernels.stream import arena_bytes
+from airtouch.reference.networks.int8_network import DENSE
 from airtouch.reference.networks.stream_int8 import StreamNetwork, int8_layer
 
 REPRESENTATIVE = 400  #: windows that set the range of each activation
@@ -60,12 +61,29 @@ def check_runs_in_c(recipe: Recipe) -> None:
     try:
         arena_bytes(network_of(arrays, recipe))
     except AirTouchError as error:
-        raise AirTouchError(f"training: the C kernels do not take this network ({error}); after a change of "
-                            "gap8/kernels, `make setup` builds them again") from None
+        new = any(OPERATIONS[layer.operation].kind is not DENSE for layer in recipe.graph)
+        again = "; after a change of gap8/kernels, `make setup` builds them again" if new else ""
+        raise AirTouchError(f"training: the C kernels do not take this network ({error}){again}") from None
 
 
 def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> StreamNetwork:
-    """The int8 network from the arrays of each layer (`reference.networks.stream_int8.int8_layer`)."""
+    """The int8 network from the arrays of each layer (`reference.networks.stream_int8.int8_layer`).
+
+    Raises AirTouchError unless there is one set of arrays a layer, and each layer reads int8 values by the scale and
+    the zero point that the layers before it give them.
+    """
     graph = recipe.graph
-    return StreamNetwork(graph, tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
-                                      for layer, part in zip(graph, arrays, strict=True)))
+    if len(arrays) != len(graph):
+        raise AirTouchError(f"int8: {len(arrays)} operators with weights for {len(graph)} layers; the `window` of an "
+                            "operation holds one")
+    layers = tuple(int8_layer(layer, OPERATIONS[layer.operation].kind, part)
+                   for layer, part in zip(graph, arrays, strict=True))
+    for i, (layer, int8) in enumerate(zip(graph, layers, strict=True)):
+        for j in layer.reads or range(max(i - 1, 0), i):
+            read, given = ((int8.input_scale, int8.input_zero_point),
+                           (layers[j].output_scale, layers[j].output_zero_point))
+            if read != given:
+                raise AirTouchError(f"int8: {layer.name} reads values of scale {read[0]:.5g} and zero point {read[1]}, "
+                                    f"{graph[j].name} gives {given[0]:.5g} and {given[1]}; in the `window` of an "
+                                    "operation only what keeps the scale stands beside the operator with weights")
+    return StreamNetwork(graph, layers)
