@@ -55,7 +55,10 @@ def figures_shown(left_out: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def _figure_at(score: Mapping[str, Any], place: str) -> Mapping[str, Any]:
-    """The figure at a place of the score; empty where there is none. An AUROC has the n of the same flights' wrong names."""
+    """The figure at a place of the score; empty where there is none.
+
+    An AUROC has the n of the same flights' wrong names.
+    """
     *keys, last = place.split("/")
     group: Mapping[str, Any] = score
     for key in keys:

@@ -26,7 +26,8 @@ def closes_too_little(closure: Closure) -> bool:
 def balance_does_not_show(name: str, closure: Closure, by_balance: Mapping[str, float]) -> bool:
     """Whether the gap is at its floor, and the balance alone does not make an effect more probable than none.
 
-    by_balance: the probabilities without the powers. There unsteadiness alone names nothing: many things shake a vehicle.
+    by_balance: the probabilities without the powers. There unsteadiness alone names nothing, as many things shake a
+    vehicle.
     """
     return closure.before <= STANDS_OUT and _weights_together(name, by_balance)[name] <= by_balance["none"]
 
