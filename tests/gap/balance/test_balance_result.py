@@ -134,6 +134,15 @@ def test_hovers_are_judged_where_no_flight_has_a_gyro_and_both_kinds_hover():
     assert not applies([short], [hover]) and not applies([hover], [short]) and not applies([hover], [])
 
 
+def test_flights_without_a_hover_are_named_and_do_not_count():
+    """Three seconds, as a flight and as a nominal one: everything but the note is as without them."""
+    short = [replace(flight(3.0, noise(3.0, 0.1, seed), name=f"short {seed}"), rates=None) for seed in (8, 9)]
+    alone = balance_result.diagnosis([hovering(4, 1.15)], [hovering(1), hovering(2)], VEHICLE)
+    beside = balance_result.diagnosis([hovering(4, 1.15), short[0]], [hovering(1), short[1], hovering(2)], VEHICLE)
+    assert any("without a hover: short 8, short 9" in note for note in beside.notes)
+    assert {**beside.plain(), "notes": []} == {**alone.plain(), "notes": []} and "1" in beside.baseline
+
+
 @pytest.mark.parametrize(("left_out", "named"), [((), True), (("com_offset",), True), (("mass",), False)])
 def test_a_centred_weight_is_named_unless_it_is_left_out_itself(left_out, named):
     """15 % more lift: with the shift of the centre left out, a weight that shifts none is still a candidate."""

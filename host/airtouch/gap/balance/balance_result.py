@@ -72,8 +72,13 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
               notes: Sequence[str] = (), without: Iterable[str] = (), pictures: bool = False) -> Diagnosis:
     """Which of the hypotheses of `hover_hypotheses` the flights' mean difference from nominal ones fits best.
 
-    notes: on logs left out; without: names that are no candidates; pictures: whether to keep a report's curves.
+    notes: on logs left out; without: names that are no candidates; pictures: whether to keep a report's curves. Flights
+    without a hover are left out, and named in a note.
     """
+    unjudged = [f.name for f in (*flights, *nominal) if not hover_pattern(f, vehicle).known]
+    flights, nominal = ([f for f in some if hover_pattern(f, vehicle).known] for some in (flights, nominal))
+    if unjudged:
+        notes = [*notes, f"too short to be judged, without a hover: {', '.join(unjudged)}"]
     voltage = all(f.log.has("vbat_V") for f in (*flights, *nominal))
     base = reference([hover_pattern(f, vehicle, voltage) for f in nominal])
     difference = base.mean_difference([hover_pattern(f, vehicle, voltage) for f in flights])
