@@ -19,7 +19,8 @@ PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend
 #: look of the gap without the named effects: broad and pale, so that it shows behind the gap with them
 BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
 FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of dense curves
-ABOVE = 2.5  #: zorder of the floor, above that of lines, which is 2: a dense curve would hide it
+ABOVE = 2.5  #: zorder of the measured curve and of the floor, above that of lines, 2: a dense curve would hide them
+ACTS: dict[str, Any] = {"facecolor": AFTER, "alpha": 0.15, "lw": 0.0, "zorder": 0.0}  #: look of the seconds in which an effect acts
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
@@ -39,7 +40,7 @@ def signals(signal: Signal) -> bytes:
     with style(PHONE):
         figure, axes = _column(rows, 1.6, LEGENDS)
         if signal.measured is not None:
-            axes[0].plot(signal.time_s, signal.measured, color="black", lw=1.0, label="measured")
+            axes[0].plot(signal.time_s, signal.measured, color="black", lw=0.8, zorder=ABOVE, label="measured")
             axes[0].plot(signal.time_s, signal.measured - signal.before, label="model", **BEHIND)
             if signal.after is not None:
                 axes[0].plot(signal.time_s, signal.measured - signal.after, color=AFTER, lw=1.0,
@@ -61,6 +62,8 @@ def signals(signal: Signal) -> bytes:
         limit(gap, *gaps, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
             _phases(ax, signal.time_s, signal.phase)
+            for begin, end in signal.acts_s:
+                ax.axvspan(begin, end, **ACTS)
             ax.margins(x=0)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.5)
         return png(figure, PHONE_DPI)

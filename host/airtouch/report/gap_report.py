@@ -19,7 +19,7 @@ from airtouch import __version__
 from airtouch.extras import lacking
 from airtouch.gap.answer import words
 from airtouch.gap.answer.advice import ADD_AN_EFFECT
-from airtouch.gap.answer.pictures import Pictures
+from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Diagnosis
@@ -138,15 +138,17 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
-        random = " Of a random effect these curves hold the mean alone." if pictures.random else ""
+        random = " Of a random effect these curves hold the mean alone, if it has one." if pictures.random else ""
+        acts = " Green: the effect acts." if signal.acts_s else ""
         floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
         low, high = signal.band_hz
         plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
-                          f"over a platform.{random}",
+                          f"over a platform.{acts}{random}",
                           partial(gap_figures.signals, signal)))
     if pictures.spectra:
-        text = "Mean over the flights."
+        text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
+                "of a constant gap.")
         if pictures.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one.")

@@ -145,8 +145,16 @@ def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
     """The third of three gaps, where the effect acts in this flight alone; without one that passes it is the second."""
     flights = [flight(SECONDS, noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((1.0, 2.0, 3.0))]
     passing = replace(bias(0.4), gate=(("3.0", 2.0, 4.0),))
-    assert pictures(*flights, effects=[passing]).signal.flight == "3.0"
+    drawn = pictures(*flights, effects=[passing]).signal
+    assert (drawn.flight, drawn.acts_s) == ("3.0", ((2.0, 4.0),))
     assert pictures(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
+
+
+def test_an_effect_that_changes_no_sample_has_no_curve_after():
+    """A bias of 0 and one of 0.4 m/s^2."""
+    pushed = flight(SECONDS, FORWARD)
+    assert pictures(pushed, effects=[bias(0.0)]).signal.after is None
+    assert pictures(pushed, effects=[bias(0.4)]).signal.after is not None
 
 
 def test_flight_without_the_channel_does_not_count_for_the_median():

@@ -24,6 +24,7 @@ from airtouch.logs.segments import KINDS
 from airtouch.simulation import signals as at
 
 GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
+SAME = 1e-6  #: of the largest value: less is no difference between two curves; chosen
 MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
 #: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
@@ -48,9 +49,10 @@ class Signal:
     """One channel of one flight in a band of frequencies; curves (n,), NaN where nothing is judged.
 
     measured: None where no sensor shows it alone; before, after: what the model leaves, without and with the effects,
-    the latter None without effects; phase: of each sample, a place in `segments.KINDS`; floor: rms of the floor in
-    that band and the sample's phase, NaN where the map does not have it; height_m: of the rotors over the ground
-    below, None where no effect of the ground is named or it is not known.
+    the latter None without effects, and of one at random that has no mean; phase: of each sample, a place in
+    `segments.KINDS`; floor: rms of the floor in that band and the sample's phase, NaN where the map does not have it;
+    height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known;
+    acts_s: begin and end, s, of each stretch in which a passing effect acts.
     """
 
     flight: str
@@ -64,6 +66,7 @@ class Signal:
     after: np.ndarray | None
     floor: np.ndarray
     height_m: np.ndarray | None = None
+    acts_s: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,9 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     acted_in = {name for t in effects for name, *_ in t.gate}
     median = _median_residual([r for r in residuals if r.flight.name in acted_in] or residuals, cells[0].channel)
     signal = None if median is None else _signal(median, cells[0], whole_map)
+    if signal is not None:
+        signal = replace(signal, acts_s=tuple((begin, end) for t in effects for name, begin, end in t.gate
+                                              if name == signal.flight))
     if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
         signal = replace(signal, height_m=_height(median.flight))
     return Pictures(signal, frequencies(AIR),
@@ -126,6 +132,9 @@ def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> 
     measured, after = (None if values is None else _band_passed(flight, values, band_hz)
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
     before = _band_passed(flight, residual.before[:, c], band_hz)
+    least = SAME * float(np.max(np.abs(np.nan_to_num(before))))
+    if after is not None and np.allclose(after, before, rtol=0.0, atol=least, equal_nan=True):
+        after = None
     floor = np.where(np.isfinite(before), _floors(cell.channel, band_hz, whole_map)[flight.phase], np.nan)
     return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, measured, before, after, floor)
