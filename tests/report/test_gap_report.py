@@ -6,6 +6,7 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -22,6 +23,7 @@ from airtouch.gap.result import FITTED, HELD_OUT, Closure, NamedEffect, OpenCell
 from airtouch.gap.signatures.candidates import term_of
 from airtouch.gap.where import summary
 from airtouch.gap.where.gap_map import gap_map
+from airtouch.logs.segments import KINDS
 from airtouch.report import gap_report, gap_tables
 from airtouch.simulation.effects import EFFECTS
 from html_page import PageReader
@@ -72,7 +74,22 @@ def test_the_curve_of_a_random_effect_is_explained_where_one_is_named(pushed_fli
     gap_report.write_diagnosis(tmp_path / "gap.html", of_flights(pushed_flights[:1], (noise,)), command="x")
     text, _ = checked(tmp_path / "gap.html")
     assert "A random effect cannot be predicted sample by sample" in text
-    assert "these curves hold the mean alone" in text
+    assert "is random and has no mean in this channel" in text and "hold the mean alone" not in text
+
+
+def test_only_phases_that_are_drawn_are_explained(pushed_flights, tmp_path):
+    """The flights hover alone; with take-off among their phases it is."""
+    result = of_flights(pushed_flights)
+    signal = replace(result.pictures.signal, phase=np.full(len(result.pictures.signal.time_s), KINDS.index("hover")))
+    hover = replace(result, pictures=replace(result.pictures, signal=signal))
+    rising = replace(result, pictures=replace(result.pictures, signal=replace(
+        signal, phase=np.full(len(signal.time_s), KINDS.index("take-off")), acts_s=((1.0, 2.0),))))
+    texts = []
+    for name, one in (("hover", hover), ("rising", rising)):
+        gap_report.write_diagnosis(tmp_path / f"{name}.html", one, command="x")
+        texts.append(checked(tmp_path / f"{name}.html")[0])
+    assert not any(word in texts[0] for word in ("Blue:", "Yellow:", "Green bar:"))
+    assert "Blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
 
 
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):

@@ -20,8 +20,8 @@ PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend
 BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
 FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of dense curves
 ABOVE = 2.5  #: zorder of the measured curve and of the floor, above that of lines, 2: a dense curve would hide them
-#: look of the seconds in which an effect acts
-ACTS: dict[str, Any] = {"facecolor": AFTER, "alpha": 0.15, "lw": 0.0, "zorder": 0.0}
+#: look of the seconds in which an effect acts: a bar along the upper end of a pane
+ACTS: dict[str, Any] = {"facecolor": AFTER, "ymin": 0.96, "lw": 0.0, "zorder": ABOVE}
 PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis

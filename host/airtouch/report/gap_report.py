@@ -29,13 +29,14 @@ from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import remaining_in_words
 from airtouch.logs.files import write_bytes
+from airtouch.logs.segments import KINDS
 from airtouch.report import gap_tables
 from airtouch.report.html_page import data_url, rendered
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
-FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase. "
+FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -138,20 +139,23 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
-        random = " Of a random effect these curves hold the mean alone, if it has one." if pictures.random else ""
-        acts = " Green: the effect acts." if signal.acts_s else ""
-        floor = FLOOR_DRAWN if np.isfinite(signal.floor).any() else ""
+        shaded = {KINDS[kind] for kind in np.unique(signal.phase)}
+        words = [*(["Blue: take-off and landing."] if shaded & {"take-off", "landing"} else []),
+                 *(["Yellow: over a platform."] if "over platform" in shaded else []),
+                 *(["Green bar: the effect acts."] if signal.acts_s else []), *_what_after_is(pictures),
+                 "An axis holds the middle 99 % of each curve."]
+        floor = [FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []
         low, high = signal.band_hz
         plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
-                          f"Flight {Path(signal.flight).name}. {floor}Blue: take-off and landing; yellow: "
-                          f"over a platform.{acts}{random}",
+                          " ".join([f"Flight {Path(signal.flight).name}.", *floor, *words]),
                           partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
                 "of a constant gap.")
         if pictures.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
-                     "the ratio of the power to the expected one.")
+                     "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
+                     "counts as gap.")
         plots.append(Plot("Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:
@@ -160,6 +164,15 @@ def _plots(pictures: Pictures) -> list[Plot]:
                           "in the loops of thrust, roll and pitch alone, so the yaw command is not drawn.",
                           partial(gap_figures.commands, pictures.commands)))
     return plots
+
+
+def _what_after_is(pictures: Pictures) -> list[str]:
+    """What the curves of the signal with a random effect are; nothing without one."""
+    if not pictures.random or pictures.signal is None:
+        return []
+    if pictures.signal.after is None:
+        return ["The effect is random and has no mean in this channel, so no curve is drawn with it."]
+    return ["Of a random effect these curves hold the mean alone."]
 
 
 def _flights(names: Sequence[str], vehicle: str, baseline: Sequence[str]) -> str:
