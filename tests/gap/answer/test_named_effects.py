@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.named_effects import in_median_shape, median_index, with_random_part
+from airtouch.gap.answer.named_effects import median_index, median_shape_fit, with_random_part
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.result import NamedEffect, Quantity
@@ -62,5 +62,5 @@ def test_the_shape_that_was_flown_is_found_from_any_other(study, fade):
     """How fast the lift of the ground dies out with height, from all the data."""
     data = Data(study, fly(2, 77, [("ground_effect", {"strength": 1.5, "fade": fade, "turbulence": 0.0})]))
     for start in terms("ground_effect"):
-        values = in_median_shape(data, whole_of(data), [start], None).terms[0].values
+        values = median_shape_fit(data, whole_of(data), [start], None).terms[0].values
         assert values["fade"] == fade

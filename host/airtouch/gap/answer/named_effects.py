@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from airtouch.gap.answer.estimates import Estimate, from_spectra, from_times, with_reading
 from airtouch.gap.evidence.data import Data
@@ -30,7 +31,7 @@ def named_effects(data: Data, selection: Selection) -> list[NamedEffect]:
         return []
     readings = selection.inference.readings if selection.inference is not None else {}
     in_spectra = [t for t in hypothesis.terms if t.shows_in != CLOCK]
-    fitted = in_median_shape(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
+    fitted = median_shape_fit(data, whole_of(data), in_spectra, _mean_of_halves(hypothesis))
     named_terms = [t for t in fitted.terms if t.slot in selection.named_slots]
     effects = [_named(t, from_spectra(data, t, fitted, hypothesis.fits), readings)
                for t in named_terms if not t.companion]
@@ -47,26 +48,27 @@ def _named(term: Term, estimate: Estimate, readings: Mapping[str, Mapping[str, R
     return NamedEffect(term.name, term.quantities(x, covariance), term.gate)
 
 
-def in_median_shape(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: np.ndarray | None,
-                    ) -> FittedTerms:
+def median_shape_fit(data: Data, all_blocks: BlockSet, terms: Sequence[Term], start: np.ndarray | None,
+                     ) -> FittedTerms:
     """Effects fitted to all the data, each in the median of its shapes: as likely one before it as one after it.
 
     start: scaled parameters from which each fit begins. All shapes of an effect are as likely before the data. Where
     the data can hardly tell them apart, the likeliest is one at the end of the list as often as not; the median is not.
     """
-    chosen = list(terms)
+    chosen, fitted = list(terms), None
     for i, term in enumerate(terms):
         shapes = term.shaped()
         if shapes:
             fits = [fit(data, all_blocks, [*chosen[:i], shape, *chosen[i + 1:]], start) for shape in shapes]
-            chosen[i] = shapes[median_index([judge(data, all_blocks, f.terms) for f in fits])]
-    return converged(data, all_blocks, fit(data, all_blocks, chosen, start))
+            median = median_index([judge(data, all_blocks, f.terms) for f in fits])
+            chosen[i], fitted = shapes[median], fits[median]
+    return converged(data, all_blocks, fitted or fit(data, all_blocks, terms, start))
 
 
 def median_index(log_likelihoods: Sequence[float]) -> int:
     """Number of the median of alternatives in their order, equally likely before the data, nats (n,)."""
-    weight = np.exp(np.array(log_likelihoods) - np.max(log_likelihoods))
-    return int(np.searchsorted(np.cumsum(weight), 0.5 * weight.sum()))
+    probability = np.exp(log_likelihoods - logsumexp(log_likelihoods))
+    return int(np.searchsorted(np.cumsum(probability), 0.5))
 
 
 def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
