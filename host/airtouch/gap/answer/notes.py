@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from airtouch.gap.answer.reasons import only_in_relations
 from airtouch.gap.naming.judging import NEAR_BOUND, at_bound
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import NamedEffect
@@ -42,9 +43,7 @@ def cannot_be_replayed(selection: Selection) -> list[str]:
     names = [n for n in RELATIONS_ONLY if n in selection.single_effects]
     if selection.inference is not None or not names:
         return []
-    reason = "and here the replay gave the answer" if selection.library_holds else (
-        "of which no library holds for these flights")
-    return [f"{' and '.join(names)} cannot be seen: only the relations of the signals show them, {reason}"]
+    return [f"{' and '.join(names)} cannot be seen: {only_in_relations(selection, 'them')}"]
 
 
 def signs_not_shown(selection: Selection) -> list[str]:

@@ -17,8 +17,6 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.signatures.signature import RELATIONS_ONLY
 
 GAP_AT_FLOOR = "the gap as a whole is at its floor"
-NOT_REPLAYED = "only the relations of the signals show it, of which no library holds for these flights"
-NOT_ASKED = "only the relations of the signals show it, and here the replay gave the answer"
 NEAREST = 3  #: effects that are reported with the reason why they fail; chosen: the rest are in the ranking
 
 
@@ -49,12 +47,19 @@ def nearest(selection: Selection) -> list[Rejected]:
     return [Rejected(h.name, shortfall(selection, h)) for h in best_first[:NEAREST]]
 
 
+def only_in_relations(selection: Selection, effects: str) -> str:
+    """Why the replay does not show some effects. effects: a pronoun for them, `it` or `them`."""
+    reason = ("and here the replay gave the answer" if selection.library_holds else
+              "of which no library holds for these flights")
+    return f"only the relations of the signals show {effects}, {reason}"
+
+
 def shortfall(selection: Selection, hypothesis: Hypothesis) -> str:
     """What an effect lacks to be the answer, in nats: of held-out log likelihood, or of the signals' relations."""
     if selection.inference is not None:
         return shortfall_by_relations(selection, selection.inference, hypothesis.name)
     if hypothesis.name in RELATIONS_ONLY:
-        return NOT_ASKED if selection.library_holds else NOT_REPLAYED
+        return only_in_relations(selection, "it")
     least = selection.least_nats[hypothesis.name]
     if hypothesis.name in {s.name for s in selection.named_steps}:  # the best there is, and not enough
         return _against_in_words(selection)
