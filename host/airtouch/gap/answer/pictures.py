@@ -114,20 +114,15 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
-    acted_in = {name for t in effects for name, *_ in t.gate}
-    median = _median_residual([r for r in residuals if r.flight.name in acted_in] or residuals, cells[0].channel)
-    signal = None if median is None else _signal(median, cells[0], whole_map)
-    if signal is not None:
-        signal = replace(signal, acts_s=tuple((begin, end) for t in effects for name, begin, end in t.gate
-                                              if name == signal.flight))
-    if signal is not None and median is not None and any(t.name == GROUND_EFFECT for t in effects):
-        signal = replace(signal, height_m=_height(median.flight))
+    gated = {name for t in effects for name, *_ in t.gate}  # flights in which a passing effect acts
+    median = _median_residual([r for r in residuals if r.flight.name in gated] or residuals, cells[0].channel)
+    signal = None if median is None else _signal(median, cells[0], whole_map, effects)
     return Pictures(signal, frequencies(AIR),
                     _spectra(study, residuals, nominal, effects, channels), commands, bool(random_of(effects)))
 
 
-def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> Signal:
-    """The curves of one flight in a cell's channel and band (`_band`)."""
+def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell], effects: Sequence[Term]) -> Signal:
+    """The curves of one flight in a cell's channel and band (`_band`); the height beside a ground effect alone."""
     flight, c, band_hz = residual.flight, COLUMN[cell.channel], _band(cell, whole_map)
     measured, after = (None if values is None else _band_passed(flight, values, band_hz)
                        for values in (_measured(flight, c), None if residual.after is None else residual.after[:, c]))
@@ -137,7 +132,9 @@ def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell]) -> 
         after = None
     floor = np.where(np.isfinite(before), _floors(cell.channel, band_hz, whole_map)[flight.phase], np.nan)
     return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
-                  flight.phase, measured, before, after, floor)
+                  flight.phase, measured, before, after, floor,
+                  _height(flight) if any(t.name == GROUND_EFFECT for t in effects) else None,
+                  tuple((begin, end) for t in effects for name, begin, end in t.gate if name == flight.name))
 
 
 def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
