@@ -61,11 +61,13 @@ OTHER_ROTORS = "which rotors are weak is not sure: instead of those named it may
 
 def applies(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle) -> bool:
     """Whether none of the flights has a gyro, and both one of them and a nominal one hover for long enough."""
-    def any_hovers(flights_of_one_kind: Sequence[Flight]) -> bool:
-        """Whether one of the flights has a hover."""
-        return any(hover_pattern(f, vehicle).known for f in flights_of_one_kind)
+    return all(f.rates is None for f in flights) and all(
+        any(_hovers(f, vehicle) for f in some) for some in (nominal, flights))
 
-    return all(f.rates is None for f in flights) and any_hovers(nominal) and any_hovers(flights)
+
+def _hovers(flight: Flight, vehicle: Vehicle) -> bool:
+    """Whether a flight has a hover."""
+    return hover_pattern(flight, vehicle).known
 
 
 def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
@@ -75,10 +77,10 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
     notes: on logs left out; without: names that are no candidates; pictures: whether to keep a report's curves. Flights
     without a hover are left out, and named in a note.
     """
-    unjudged = [f.name for f in (*flights, *nominal) if not hover_pattern(f, vehicle).known]
-    flights, nominal = ([f for f in some if hover_pattern(f, vehicle).known] for some in (flights, nominal))
-    if unjudged:
-        notes = [*notes, f"too short to be judged, without a hover: {', '.join(unjudged)}"]
+    without_hover = [f.name for f in (*flights, *nominal) if not _hovers(f, vehicle)]
+    if without_hover:
+        notes = [*notes, f"too short to be judged, without a hover: {', '.join(without_hover)}"]
+        flights, nominal = ([f for f in some if _hovers(f, vehicle)] for some in (flights, nominal))
     voltage = all(f.log.has("vbat_V") for f in (*flights, *nominal))
     base = reference([hover_pattern(f, vehicle, voltage) for f in nominal])
     difference = base.mean_difference([hover_pattern(f, vehicle, voltage) for f in flights])
