@@ -54,9 +54,10 @@ def test_a_users_effect_is_found_and_sized_and_is_unknown_when_left_out(magnet):
     assert len(Path(PAGE).read_text().split("```python")[1].split("```")[0].splitlines()) < 60
     diagnosis = diagnose(real, vehicle, nominal, without=LOOP)
     assert diagnosis.verdict == "effect" and diagnosis.effects[0].name == NAME
-    said = [*diagnosis.cannot, *(r.why for r in diagnosis.ranking)]  # of what the replay, which named it, does not show
-    assert sum("here the replay gave the answer" in line for line in said) == 3
-    assert not any("no library" in line for line in said)
+    # of what the replay, which named it, does not show
+    reasons = [*diagnosis.cannot, *(r.why for r in diagnosis.ranking)]
+    assert sum("here the replay gave the answer" in line for line in reasons) == 3
+    assert not any("no library" in line for line in reasons)
     force = diagnosis.effects[0].parameters["force"]
     np.testing.assert_allclose(force.value, FORCE_N, rtol=0.3)
     assert diagnosis.shrink.value > 0.8

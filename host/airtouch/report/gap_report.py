@@ -37,6 +37,7 @@ NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip i
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
+AXIS_LIMITS = "An axis holds the middle 99 % of each curve."  #: in the plot of a signal, by `style.limit`
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
@@ -139,16 +140,16 @@ def _plots(pictures: Pictures) -> list[Plot]:
     plots = []
     if pictures.signal is not None:
         signal = pictures.signal
-        shaded = {KINDS[kind] for kind in np.unique(signal.phase)}
-        words = [*(["Blue: take-off and landing."] if shaded & {"take-off", "landing"} else []),
-                 *(["Yellow: over a platform."] if "over platform" in shaded else []),
-                 *(["Green bar: the effect acts."] if signal.acts_s else []), *_what_after_is(pictures),
-                 "An axis holds the middle 99 % of each curve."]
-        floor = [FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []
+        phases = {KINDS[kind] for kind in np.unique(signal.phase)}
+        caption = [f"Flight {Path(signal.flight).name}.",
+                   *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
+                   *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
+                   *(["Yellow: over a platform."] if "over platform" in phases else []),
+                   *(["Green bar: the effect acts."] if signal.acts_s else []),
+                   *_curves_of_a_random_effect(pictures), AXIS_LIMITS]
         low, high = signal.band_hz
         plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
-                          " ".join([f"Flight {Path(signal.flight).name}.", *floor, *words]),
-                          partial(gap_figures.signals, signal)))
+                          " ".join(caption), partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
                 "of a constant gap.")
@@ -166,7 +167,7 @@ def _plots(pictures: Pictures) -> list[Plot]:
     return plots
 
 
-def _what_after_is(pictures: Pictures) -> list[str]:
+def _curves_of_a_random_effect(pictures: Pictures) -> list[str]:
     """What the curves of the signal with a random effect are; nothing without one."""
     if not pictures.random or pictures.signal is None:
         return []

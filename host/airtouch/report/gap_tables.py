@@ -7,7 +7,7 @@ asked for and written out.
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, printed, seconds_in_words
+from airtouch.gap.answer.words import SHRINK_FORM, format_of, leading, printed_value, seconds_in_words
 from airtouch.gap.result import Diagnosis, Quantity
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS
 from airtouch.gap.where import summary
@@ -133,9 +133,9 @@ def remaining_to_name(remaining: Sequence[Cell], headline: Cell | None) -> list[
 
     The latter are the cells that got worse with the named effects, and those of the headline's channel.
     """
-    more = [c for c in remaining[MOST_REMAINING:]
-            if summary.got_worse(c) or (headline is not None and c.channel == headline.channel)]
-    return [*remaining[:MOST_REMAINING], *more[:MOST_REMAINING]]
+    of_answer = [c for c in remaining[MOST_REMAINING:]
+                 if summary.got_worse(c) or (headline is not None and c.channel == headline.channel)]
+    return [*remaining[:MOST_REMAINING], *of_answer[:MOST_REMAINING]]
 
 
 def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
@@ -145,7 +145,7 @@ def effect_rows(diagnosis: Diagnosis) -> list[dict[str, str]]:
         name, seconds = effect.name, seconds_in_words(effect)
         for parameter, q in effect.parameters.items():
             form = format_of(q)
-            rows.append({"effect": name, "parameter": parameter, "value": form.format(printed(q)),
+            rows.append({"effect": name, "parameter": parameter, "value": form.format(printed_value(q)),
                          "interval": _interval(q, form), "unit": "" if q.unit == "1" else q.unit,
                          "seconds": f"acts {seconds}" if seconds else ""})
             name = seconds = ""
@@ -191,7 +191,7 @@ def _shrink(shrink: Quantity | None) -> WithInterval:
 def with_interval(q: Quantity, form: str) -> WithInterval:
     """A quantity with its unit, and its interval. form: format of a number, as `{:.2f}`."""
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
-    return WithInterval(form.format(printed(q)) + unit, _interval(q, form))
+    return WithInterval(form.format(printed_value(q)) + unit, _interval(q, form))
 
 
 def parameter_rows(parameters: Mapping[str, Quantity]) -> list[tuple[str, WithInterval]]:

@@ -94,21 +94,21 @@ def test_an_export_tells_of_a_model_that_is_not_tflite_micros(small, tmp_path):
     pytest.importorskip("tflite_micro")
     small.save(tmp_path / "own.npz")
     arguments = ["--out", str(tmp_path / "model")]
-    told = CliRunner().invoke(export_command.command, [str(tmp_path / "own.npz"), *arguments])
-    assert told.exit_code == 0 and "tflite-micro gives the same bits on 20 windows" in told.output
+    result = CliRunner().invoke(export_command.command, [str(tmp_path / "own.npz"), *arguments])
+    assert result.exit_code == 0 and "tflite-micro gives the same bits on 20 windows" in result.output
     layers = list(small.int8.layers)
     layers[2] = replace(layers[2], bias=layers[2].bias + 2000)
     replace(small, int8=replace(small.int8, layers=tuple(layers))).save(tmp_path / "other.npz")
-    told = CliRunner().invoke(export_command.command, [str(tmp_path / "other.npz"), *arguments, "--force"])
-    assert isinstance(told.exception, AirTouchError)
-    assert re.search(r"tflite-micro differ on \d+ of 20", str(told.exception))
+    result = CliRunner().invoke(export_command.command, [str(tmp_path / "other.npz"), *arguments, "--force"])
+    assert isinstance(result.exception, AirTouchError)
+    assert re.search(r"tflite-micro differ on \d+ of 20", str(result.exception))
 
 
 def test_an_export_without_tflite_micro_says_that_nothing_was_compared(small, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "tflite_micro", None)
     small.save(tmp_path / "own.npz")
-    told = CliRunner().invoke(export_command.command, [str(tmp_path / "own.npz"), "--out", str(tmp_path / "model")])
-    assert told.exit_code == 0 and "not compared with tflite-micro, which is not installed" in told.output
+    result = CliRunner().invoke(export_command.command, [str(tmp_path / "own.npz"), "--out", str(tmp_path / "model")])
+    assert result.exit_code == 0 and "not compared with tflite-micro, which is not installed" in result.output
 
 
 def test_the_float_network_is_what_was_quantised(small):

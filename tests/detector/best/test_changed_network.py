@@ -58,8 +58,8 @@ def test_a_changed_network_is_trained_saved_run_and_exported(tmp_path, monkeypat
     for i in range(2):
         logs.write(made_flight(i), tmp_path / "flights" / f"{i}.csv")
     monkeypatch.setattr(fit_settings, "Recipe", lambda: replace(SMALL, steps=3))
-    told = CliRunner().invoke(train.command, [str(tmp_path / "flights"), "--out", str(tmp_path / "mine.npz")])
-    assert told.exit_code == 0, told.output + str(told.exception)
+    result = CliRunner().invoke(train.command, [str(tmp_path / "flights"), "--out", str(tmp_path / "mine.npz")])
+    assert result.exit_code == 0, result.output + str(result.exception)
     again = best.load(tmp_path / "mine.npz")
     assert again.int8.layers[-1].weights.shape[0] == len(outputs.OUTPUTS)
     assert again.int8.layers[2].weights.shape == (SMALL.width, SMALL.width)
@@ -97,8 +97,8 @@ def test_a_network_that_the_built_kernels_do_not_take_is_refused_at_once(monkeyp
     with pytest.raises(AirTouchError, match=message):
         best.fit([made_flight()], recipe=SMALL)
     monkeypatch.setattr(simulated, "training_flights", lambda *_, **__: pytest.fail("flights were simulated"))
-    told = CliRunner().invoke(train.command, ["--simulated", "4", "--out", str(tmp_path / "mine.npz")])
-    assert isinstance(told.exception, AirTouchError) and re.search(message, str(told.exception))
+    result = CliRunner().invoke(train.command, ["--simulated", "4", "--out", str(tmp_path / "mine.npz")])
+    assert isinstance(result.exception, AirTouchError) and re.search(message, str(result.exception))
 
 
 def test_layers_of_other_widths_fit_the_kernels_with_the_head_of_the_page(monkeypatch):

@@ -45,13 +45,13 @@ def test_a_free_curve_finds_a_lift_of_straight_lines(lift, monkeypatch):
     monkeypatch.setattr(gap_lift, "CURVE_M", np.array(gap_lift.FREE_M))  # the descent is made of it too
     monkeypatch.setitem(globals(), "CURVE_M", np.array(gap_lift.FREE_M))
     monkeypatch.setitem(globals(), "LIFT", np.array([0.12, 0.1, 0.06, 0.03, 0.01, 0.0]))
-    found = gap_lift.free_lift(descent(lift, -0.03), VEHICLE, STANDING_M)
-    assert found == pytest.approx(lift * np.array([0.1, 0.06]), abs=1e-6)
+    lift_at_heights = gap_lift.free_lift(descent(lift, -0.03), VEHICLE, STANDING_M)
+    assert lift_at_heights == pytest.approx(lift * np.array([0.1, 0.06]), abs=1e-6)
 
 
 def test_each_channel_shows_the_strength_that_was_flown():
     """Of simulated flights with twice the preset's lift, whose nominal ones have none."""
     study = calibrated(FLOWN, fly(3, 41), scatter=False)[0]
     flight, = fly(1, 5, [("ground_effect", {"strength": 2.9, "fade": 0.0875, "turbulence": 0.0})])
-    found = gap_lift.strengths(study, flight, "crazyflie-34g")
-    assert found[:2] == pytest.approx([2.0, 2.0], abs=0.4) and found[3] == pytest.approx(2.0, abs=0.6)
+    strengths = gap_lift.strengths(study, flight, "crazyflie-34g")
+    assert strengths[:2] == pytest.approx([2.0, 2.0], abs=0.4) and strengths[3] == pytest.approx(2.0, abs=0.6)

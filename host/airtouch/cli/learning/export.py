@@ -53,17 +53,17 @@ def command(model: Path | None, vehicle: str | None, out: Path | None, only_chec
             export.check(trained, out, name)
             click.echo(f"{out}: up to date with {trained.metadata['detector']} model {trained.digest[:12]}")
             continue
-        compared = _compared(trained) if model else ""
+        comparison = _comparison(trained) if model else ""
         for path in export.export(trained, out, name, force):
             click.echo(f"written: {path}")
         click.echo(f"{trained.metadata['detector']} model {trained.digest[:12]}: "
-                   f"{parameter_bytes(trained.int8)} bytes of constants{compared}")
+                   f"{parameter_bytes(trained.int8)} bytes of constants{comparison}")
     if only_check and shipped:
         export.check_nothing_else(shipped, out)
 
 
-def _compared(trained: Trained) -> str:
-    """What is told of the comparison with tflite-micro, of models of `best`; AirTouchError where it differs."""
+def _comparison(trained: Trained) -> str:
+    """The outcome of the comparison with tflite-micro, of models of `best`; AirTouchError where it differs."""
     if not isinstance(trained, best_model.BestModel):
         return ""
     windows = best_export.check_against_tflite_micro(trained)

@@ -64,10 +64,10 @@ def check_against_tflite_micro(model: BestModel) -> int:
     quantised, expected = golden_flight(model.int8, model.int8.receptive_samples + GOLDEN)
     rows = np.linspace(-(-model.int8.receptive_samples // model.int8.stride), len(expected) - 1, COMPARED).astype(int)
     try:
-        given = rows_of_tflite_micro(model, quantised, rows)
+        outputs = rows_of_tflite_micro(model, quantised, rows)
     except ImportError:
         return 0
-    wrong = int((given != expected[rows]).any(axis=1).sum())
+    wrong = int((outputs != expected[rows]).any(axis=1).sum())
     if wrong:
         raise AirTouchError(f"the int8 network and tflite-micro differ on {wrong} of {len(rows)} windows: an operation "
                             "of the network is not the same in both")

@@ -80,10 +80,10 @@ def network_of(arrays: Sequence[dict[str, np.ndarray]], recipe: Recipe) -> Strea
                    for layer, part in zip(graph, arrays, strict=True))
     for i, (layer, int8) in enumerate(zip(graph, layers, strict=True)):
         for j in layer.reads or range(max(i - 1, 0), i):
-            read, given = ((int8.input_scale, int8.input_zero_point),
-                           (layers[j].output_scale, layers[j].output_zero_point))
-            if read != given:
-                raise AirTouchError(f"int8: {layer.name} reads values of scale {read[0]:.5g} and zero point {read[1]}, "
-                                    f"{graph[j].name} gives {given[0]:.5g} and {given[1]}; in the `window` of an "
+            source = layers[j]
+            if (int8.input_scale, int8.input_zero_point) != (source.output_scale, source.output_zero_point):
+                raise AirTouchError(f"int8: {layer.name} reads values of scale {int8.input_scale:.5g} and zero point "
+                                    f"{int8.input_zero_point}, {graph[j].name} gives {source.output_scale:.5g} and "
+                                    f"{source.output_zero_point}; in the `window` of an "
                                     "operation only what keeps the scale stands beside the operator with weights")
     return StreamNetwork(graph, layers)

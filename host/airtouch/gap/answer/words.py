@@ -27,10 +27,10 @@ def quantity(q: Quantity, form: str | None = None) -> str:
     form = form or format_of(q)
     unit = "" if q.unit in ("1", "") else f" {q.unit}"
     interval = "" if q.low is None or q.high is None else f" ({form.format(q.low)} to {form.format(q.high)})"
-    return form.format(printed(q)) + unit + interval
+    return form.format(printed_value(q)) + unit + interval
 
 
-def printed(q: Quantity) -> float:
+def printed_value(q: Quantity) -> float:
     """The value, and 0 where it is so small beside the ends of its interval that its digits mean nothing."""
     ends = max((abs(end) for end in (q.low, q.high) if end is not None), default=0.0)
     return 0.0 if abs(q.value) < VANISHING * ends else q.value
