@@ -1,9 +1,11 @@
 """Power spectra that random effects add to the residual of a flight.
 
 White noise of the IMU, noise of the thrust and the rotors' lines in closed form; others by running the effect itself on
-the flight's signals with several seeds.
+the flight's signals with several seeds. Two residuals have them: the one that hypotheses are judged by, whose torque is
+that of `signals.response` (`extra_power`), and measured minus replayed, which the map shows (`replayed_power`).
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +18,7 @@ from airtouch.gap.flights.blocks import hann_window
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.loop.axis_plant import axis_plant
 from airtouch.gap.loop.controller import AXES
+from airtouch.gap.loop.disturbed import disturbed, gyro_noise_replayed
 from airtouch.gap.loop.noise_spectra import noise_power
 from airtouch.gap.signals.channels import COUNT, FORCE, RATE, TORQUE, inside, residual
 from airtouch.gap.signals.spectra import (
@@ -42,17 +45,35 @@ LIFT_AND_TORQUE = slice(FORCE.stop - 1, TORQUE.stop)  #: channels that the rotor
 
 
 def extra_power(data: Data, term: Term) -> list[Spectra]:
-    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state, unit^2/Hz."""
+    """PSD (blocks, bins, COUNT) that a random effect with its values adds, by flight and state, unit^2/Hz.
+
+    It is that of `Data.residual`, whose torque in the air is held against the response of nominal flights.
+    """
+    return _at_strength(data, term, "random", _judged_power)
+
+
+def replayed_power(data: Data, term: Term) -> list[Spectra]:
+    """PSD (blocks, bins, COUNT) that a random effect adds to measured minus replayed, by flight and state, unit^2/Hz.
+
+    That is the residual of `Study.residual`, in which all that the logged commands answer to an effect counts as
+    modelled torque.
+    """
+    return _at_strength(data, term, "random, replayed", _replayed_power)
+
+
+def _at_strength(data: Data, term: Term, name: str, of_strength_1: Callable[[Data, int, Term], Spectra],
+                 ) -> list[Spectra]:
+    """Power of a term by flight, from that of a flight at scaled strength 1, which is cached under a name."""
     weak = replace(term, gate=()).fitted(np.ones(len(term.free)))
-    of_strength_1 = data.workspace.cached(
-        "random", weak.active().key, lambda: [_power_of_strength_1(data, i, weak) for i in range(len(data.flights))])
-    (name, *_) = term.free
-    neutral = neutral_of(parameter_of(term.effect, name))
-    scale = growth(term, (term.values[name] - neutral) / (weak.values[name] - neutral))
+    by_flight = data.workspace.cached(
+        name, weak.active().key, lambda: [of_strength_1(data, i, weak) for i in range(len(data.flights))])
+    (free, *_) = term.free
+    neutral = neutral_of(parameter_of(term.effect, free))
+    scale = growth(term, (term.values[free] - neutral) / (weak.values[free] - neutral))
     if term.gate:
         return [{state: scale * v * _covered(data, i, state, term.gate) for state, v in f.items()}
-                for i, f in enumerate(of_strength_1)]
-    return [{state: scale * v for state, v in f.items()} for f in of_strength_1]
+                for i, f in enumerate(by_flight)]
+    return [{state: scale * v for state, v in f.items()} for f in by_flight]
 
 
 def _covered(data: Data, i: int, state: str, gate: Gate) -> np.ndarray:
@@ -72,14 +93,41 @@ def growth(term: Term, x: float) -> float:
     return max(factor ** 2 - 1.0, 0.0) / (of_one ** 2 - 1.0)
 
 
-def _power_of_strength_1(data: Data, i: int, term: Term) -> Spectra:
-    """PSD (blocks, bins, COUNT) by state that a random effect of scaled strength 1 adds to flight i, unit^2/Hz."""
-    closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
-    power_by_state = closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
-    response = data.study.response
-    if response is not None and data.flights[i].rates is not None:
-        power_by_state[AIR][:, :, TORQUE] *= response.random_power(data.quiet[i], term.signature.sensed)
+def _judged_power(data: Data, i: int, term: Term) -> Spectra:
+    """PSD by state that a term with its values adds to `Data.residual` of flight i."""
+    power_by_state, study = _power_at_source(data, i, term), data.study
+    if data.flights[i].rates is None:
+        return power_by_state
+    torque = power_by_state[AIR][:, :, TORQUE]
+    if term.signature.spectrum == IMU_NOISE:
+        torque[:] = _beyond_declared(term) * _torque_noise(study, _gyro_differences(study, AIR))
+    if study.response is not None:
+        torque *= study.response.random_power(data.quiet[i], term.signature.sensed)
     return power_by_state
+
+
+def _replayed_power(data: Data, i: int, term: Term) -> Spectra:
+    """PSD by state that a term with its values adds to measured minus replayed of flight i.
+
+    The replay takes what the loop commands against a torque, or makes of the gyro's noise, for torque. Of the rotors'
+    lines the loop makes little, as they turn faster than its low-pass.
+    """
+    power_by_state, study = _power_at_source(data, i, term), data.study
+    if study.loop is None or data.flights[i].rates is None:
+        return power_by_state
+    f, row = frequencies(AIR), prepare(study.vehicle, study.calibration)[0][0]
+    if term.signature.spectrum == IMU_NOISE:
+        above = np.maximum(f, LEAKED * f[1])  # as `_difference`
+        power_by_state[AIR][:, :, TORQUE] *= gyro_noise_replayed(study.loop.controllers, row, above)
+    elif not term.signature.sensed:
+        power_by_state[AIR][:, :, TORQUE] *= disturbed(study.loop.controllers, row, f).power_beyond()
+    return power_by_state
+
+
+def _power_at_source(data: Data, i: int, term: Term) -> Spectra:
+    """PSD (blocks, bins, COUNT) by state of a random term with its values in flight i, before the loop answers it."""
+    closed_forms = {IMU_NOISE: _imu_noise, THRUST_NOISE: _thrust_noise, ROTOR_LINES: _rotor_lines}
+    return closed_forms.get(term.signature.spectrum, _by_running)(data, i, term)
 
 
 def _by_running(data: Data, i: int, term: Term) -> Spectra:
@@ -124,29 +172,38 @@ def _no_power(data: Data, i: int) -> Spectra:
 def _imu_noise(data: Data, i: int, term: Term) -> Spectra:
     """PSD of white noise of gyro and accelerometer, the latter through its low-pass and folded by the log."""
     row = prepare(data.study.vehicle, ())[0][0]
-    extra = term.values["factor"] ** 2 - 1.0
     out = _no_power(data, i)
     for state, table in out.items():
         f = frequencies(state)
         white = np.zeros((len(f), COUNT))
         white[:, FORCE] = logged_noise(row, f)[:, None] * np.asarray(row["acc_noise"]) ** 2
         if data.flights[i].rates is not None:
-            gyro = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
-            white[:, TORQUE] = _torque_noise(data.study, state, _difference(state)[:, None] * gyro)
-            white[:, RATE] = gyro
-        table[:] = extra * white
+            white[:, TORQUE] = _gyro_differences(data.study, state)
+            white[:, RATE] = 2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2
+        table[:] = _beyond_declared(term) * white
     return out
 
 
-def _torque_noise(study: Study, state: str, gyro: np.ndarray) -> np.ndarray:
-    """PSD (bins, 3) of the torque from that of the gyro's differences, gyro (bins, 3).
+def _beyond_declared(term: Term) -> float:
+    """Power that a term of noise of the IMU adds, over that of the declared noise."""
+    return term.values["factor"] ** 2 - 1.0
 
-    In the air the controller answers the gyro's noise, so that the commands predict part of it: at most the nominal
-    floor is left in the residual. What the floor holds beyond comes from the commands, in part moved by the gyro too.
+
+def _gyro_differences(study: Study, state: str) -> np.ndarray:
+    """PSD (bins, 3) of the differences of the gyro's declared noise, (rad/s^2)^2/Hz."""
+    row = prepare(study.vehicle, ())[0][0]
+    return _difference(state)[:, None] * (2.0 * PERIOD_S * np.asarray(row["gyro_noise"]) ** 2)
+
+
+def _torque_noise(study: Study, gyro: np.ndarray) -> np.ndarray:
+    """PSD (bins, 3) of the torque in the air from that of the gyro's differences, gyro (bins, 3).
+
+    The controller answers the gyro's noise, so that the commands predict part of it: at most the nominal floor is left
+    in the residual. What the floor holds beyond comes from the commands, in part moved by the gyro too.
     """
-    if state != AIR or state not in study.floor.power:
+    if AIR not in study.floor.power:
         return gyro
-    floor = np.nan_to_num(study.floor.power[state][:, TORQUE])
+    floor = np.nan_to_num(study.floor.power[AIR][:, TORQUE])
     beyond = _gyro_share(study) * np.maximum(floor - gyro, 0.0)
     return np.minimum(gyro, floor) + beyond
 

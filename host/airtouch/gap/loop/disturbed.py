@@ -1,4 +1,4 @@
-"""What a torque from outside leaves in a log: how the vehicle turns, and what the loop commands against it.
+"""What a torque from outside, or noise of the gyro, leaves in a log: in the measured turn, and in the commands.
 
 The loop answers within milliseconds, and its answer is in the log as well: held over a sample of the log, with or
 without the kicks of steps, which are over in one run of the controller. A model that replays the log takes that for
@@ -13,9 +13,13 @@ import numpy as np
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, arm_of, axis_plant
 from airtouch.gap.loop.controller import AXES, DEGREES, Controller, newtons_per_command, share_of_gain
-from airtouch.gap.loop.loop_model import LOWEST_HZ, factors_of, loop_parts, plant_of, sensed_late
-from airtouch.gap.loop.noise_spectra import kick_of
+from airtouch.gap.loop.loop_model import LOWEST_HZ, factors_of, loop_parts, plant_of, sensed_late, torque_per_command
+from airtouch.gap.loop.noise_spectra import FOLDS, difference, kick_of
 from airtouch.simulation.firmware import settings
+
+#: relative error of the loop model in the commands that answer a torque: that in eight pairs of simulated flights with
+#: and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz)
+ANSWER_DOUBT = 0.2
 
 
 class Disturbed(NamedTuple):
@@ -26,6 +30,14 @@ class Disturbed(NamedTuple):
 
     measured: np.ndarray
     commanded: np.ndarray
+
+    def power_beyond(self, share: np.ndarray | float = 1.0) -> np.ndarray:
+        """Power (bins, 3) that measured minus a share of the commanded has of an outside acceleration of unit power.
+
+        share (bins, 3), complex: all of it where a model replays the commands.
+        """
+        answer = share * self.commanded
+        return np.abs(self.measured - answer) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2
 
 
 class AxisTransfers(NamedTuple):
@@ -49,6 +61,30 @@ def disturbed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -
             _responses(pitch, f, _tilt(pitch, axis_plant(row, AXES[2]), f)),
             _responses(roll, f, _yaw(roll, row, f))]
     return Disturbed(*(np.stack(x, axis=1) for x in zip(*axes, strict=True)))
+
+
+def gyro_noise_replayed(controllers: Sequence[Controller], row: PlantRow, f: np.ndarray) -> np.ndarray:
+    """Power (bins, 3) that measured minus replayed has of the gyro's noise, over that of the noise's differences.
+
+    Noise up to half the rate of the controller folds into the log, one frequency of it at each of FOLDS: in the gyro
+    as it is, in the command as the controller makes it of that frequency. Of yaw it is 1, as its loop is slow.
+    f (bins,): above 0, Hz. controllers: of AXES.
+    """
+    out = np.ones((len(f), 3))
+    for i, c in enumerate(controllers[1:]):
+        plant = axis_plant(row, AXES[1 + i])
+        modelled = torque_per_command(c, plant, f) * logged_over_flown(c, f)
+        total, noise = np.zeros(len(f)), np.zeros(len(f))
+        for fold in FOLDS if c.period_s < 0.5 * PERIOD_S else FOLDS[:1]:
+            g = f + fold / PERIOD_S
+            parts, factors = loop_parts(c, plant, g), factors_of(c, g)
+            kick, sensed = kick_of(c, factors), 1.0 / factors.chip
+            rate = -parts.plant * (parts.rate + parts.angle) / parts.return_difference
+            logged = -(parts.rate + kick * parts.angle) - parts.logged_controller(kick) * rate
+            total += np.abs(difference(f) * (sensed + rate) - modelled * logged) ** 2
+            noise += np.abs(difference(f) * sensed) ** 2
+        out[:, i] = total / noise
+    return out
 
 
 def _responses(c: Controller, f: np.ndarray, axis: AxisTransfers) -> tuple[np.ndarray, np.ndarray]:

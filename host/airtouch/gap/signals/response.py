@@ -43,9 +43,6 @@ FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a singl
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
-#: relative error of the loop model in the commands that answer a torque: that in eight pairs of simulated flights with
-#: and without thrust noise, where turning and answer all but cancel (yaw, 1 to 4 Hz)
-ANSWER_DOUBT = 0.2
 #: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this on it is
 #: believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says less of
 #: effects that act through the commands; with a smaller one noise of the gyro counts as a response
@@ -236,8 +233,7 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     enough = chosen.sum(axis=0) >= FEWEST_OF_KIND
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
-    remains = loop.measured - answer
-    outside = OutsideTorque(remains, np.abs(remains) ** 2 + np.abs(ANSWER_DOUBT * answer) ** 2)
+    outside = OutsideTorque(loop.measured - answer, loop.power_beyond(coherent))
     return Law(kind, transfer, coherent, outside, weight, _smooth(power)), own_floor
 
 

@@ -13,18 +13,16 @@ from itertools import groupby
 
 import numpy as np
 
-from airtouch.gap.evidence import random_effects
-from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE, inside
-from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
-from airtouch.gap.where.band_sums import Sums, block_sums, join, samples_within
+from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
-from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains, sensor_rms
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, sensor_rms
+from airtouch.gap.where.random_power import random_power
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
@@ -123,23 +121,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
         return gap
     sensor = sensor_rms(study.vehicle) ** 2
     noise = np.minimum(sensor * gap.weight[:, :, None, None], gap.power)
-    return replace(gap, power=noise + np.abs(gap.power - noise - _random_power(study, flight, random, gap)))
-
-
-def _random_power(study: Study, flight: Flight, terms: Sequence[Term], of_blocks: Sums) -> np.ndarray:
-    """Sums of squares (b, r, bands, COUNT) that random effects add to the block sums of a flight.
-
-    An effect adds its mean power in the flight at each sample at which it acts, and none at the others.
-    """
-    data, out = Data(study, [flight]), np.zeros_like(of_blocks.power)
-    for term in terms:
-        power = random_effects.extra_power(data, replace(term, gate=()))[0]
-        acting = samples_within(flight, inside(term.gate, flight), study.vehicle) if term.gate else of_blocks.weight
-        for rows, state in ((of_blocks.phase == GROUND, REST), (of_blocks.phase != GROUND, AIR)):
-            if len(power[state]):
-                density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
-                out[rows] += acting[rows][:, :, None, None] * (density @ power[state].mean(axis=0))
-    return out
+    return replace(gap, power=noise + np.abs(gap.power - noise - random_power(study, flight, random, gap)))
 
 
 def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,

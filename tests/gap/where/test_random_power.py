@@ -1,0 +1,103 @@
+"""Power that random effects add to block sums, against simulated pairs of flights of one seed."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from airtouch.gap.flights.flight import GROUND
+from airtouch.gap.nominal.build_study import declared_study
+from airtouch.gap.signals.channels import TORQUE
+from airtouch.gap.signatures.candidates import mean_of, random_of, random_part_of, terms
+from airtouch.gap.where.band_sums import block_sums
+from airtouch.gap.where.random_power import random_power
+from airtouch.logs.segments import KINDS
+from gap_flights import VEHICLE, fly
+
+FLIGHTS = 8  #: pairs of flights
+CHANCE = 1e-3  #: that a right model leaves the limits of a comparison somewhere
+#: fraction by which a right model may be off where the scatter allows less, as the loop's model is one of small signals
+#: and the turbulence is drawn once a sample; chosen, 1 dB
+LOOP_ERROR = 0.25
+IN_AIR = [p for p in range(len(KINDS)) if p != GROUND]
+
+
+@cache
+def nominal_study():
+    return declared_study(VEHICLE, fly(5, 41))
+
+
+@cache
+def calm():
+    return fly(FLIGHTS, 7)
+
+
+def with_values(name, **values):
+    """The variant of an effect whose other parameters have these values."""
+    alike = [t for t in terms(name) if all(t.values[k] == v for k, v in values.items() if k not in t.free)]
+    return replace(alike[0], values={**alike[0].values, **values})
+
+
+def with_turbulence(name, strength, turbulence, **values):
+    """The mean and the random part of an effect, as a diagnosis names them, and its values as the simulator has them.
+
+    The random part is one of strength 1.
+    """
+    mean, random = terms(name)[0], random_part_of(name)
+    shape = {**{k: v for k, v in mean.values.items() if k not in ("strength", "turbulence")}, **values}
+    parts = [replace(mean, values={**mean.values, **shape, "strength": strength}),
+             replace(random, values={**random.values, **shape, "turbulence": strength * turbulence})]
+    return parts, {**shape, "strength": strength, "turbulence": turbulence}
+
+
+def per_sample(sums, power, rows):
+    """Mean square (bands, COUNT) of some rows."""
+    return power[rows, 0].sum(axis=0) / sums.weight[rows, 0].sum()
+
+
+def added_and_expected(effect, parts, phases):
+    """Mean squares (flights, bands, COUNT) that the effect adds to simulated flights, and what is expected of them.
+
+    Third: the mean squares of the flights without it. All are of some phases.
+    """
+    out = []
+    for without, shaken in zip(calm(), fly(FLIGHTS, 7, [effect]), strict=True):
+        gap = nominal_study().residual(shaken, [t.active() for t in mean_of(parts)])
+        sums = block_sums(shaken, gap, VEHICLE)
+        before = block_sums(without, nominal_study().residual(without), VEHICLE)
+        expected = random_power(nominal_study(), shaken, random_of(parts), sums)
+        rows, rows_before = np.isin(sums.phase, phases), np.isin(before.phase, phases)
+        of_calm = per_sample(before, before.power, rows_before)
+        out.append((per_sample(sums, sums.power, rows) - of_calm, per_sample(sums, expected, rows), of_calm))
+    return np.array(out).swapaxes(0, 1)
+
+
+def ratio_and_scatter(added, expected):
+    """Ratio of the means over flights, each (flights, ...), and its standard deviation by their scatter."""
+    size = expected.mean(axis=0)
+    return added.mean(axis=0) / size, added.std(axis=0, ddof=1) / np.sqrt(len(added)) / size
+
+
+def assert_as_expected(added, expected, error=0.0):
+    """All cells (flights, ...) within their scatter; error: by which the model may be off beside it."""
+    ratio, scatter = ratio_and_scatter(added, expected)
+    wide = student.isf(0.5 * CHANCE / ratio.size, len(added) - 1)
+    assert (np.abs(ratio - 1.0) < wide * scatter + error).all(), f"{ratio.round(2)}, scatter {scatter.round(2)}"
+
+
+@pytest.mark.parametrize(("name", "values", "channels"), [
+    ("motor_noise", {"time": 0.005, "rms": 0.1}, [2, 3, 4, 5]),
+    ("motor_noise", {"time": 0.1, "rms": 0.05}, [2, 3, 4, 5]),
+    ("gust", {"length": 0.5, "rms": 0.3}, [0, 1]), ("imu_noise", {"factor": 2.0}, [0, 1, 2, 3, 4, 5])])
+def test_in_the_air_the_power_is_that_of_simulated_pairs(name, values, channels):
+    part = with_values(name, **values)
+    added, expected, _ = added_and_expected((name, dict(part.values)), [part], IN_AIR)
+    assert_as_expected(added[:, :, channels], expected[:, :, channels], LOOP_ERROR)
+
+
+def test_the_torque_of_a_wake_is_that_of_simulated_pairs():
+    parts, values = with_turbulence("downwash", 0.1, 0.6, width=0.0)
+    added, expected, _ = added_and_expected(("downwash", values), parts, IN_AIR)
+    assert_as_expected(added[:, :, TORQUE], expected[:, :, TORQUE], LOOP_ERROR)
