@@ -1,4 +1,4 @@
-"""Power that random effects add to block sums, against simulated pairs of flights of one seed."""
+"""Power that random effects add to block sums: in closed form, and against simulated pairs of flights of one seed."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,18 +9,20 @@ from scipy.stats import t as student
 
 from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.nominal.build_study import declared_study
-from airtouch.gap.signals.channels import TORQUE
+from airtouch.gap.signals.channels import FORCE, TORQUE
 from airtouch.gap.signatures.candidates import mean_of, random_of, random_part_of, terms
 from airtouch.gap.where.band_sums import block_sums
+from airtouch.gap.where.filter_bank import sensor_rms
 from airtouch.gap.where.random_power import random_power
 from airtouch.logs.segments import KINDS
-from gap_flights import VEHICLE, fly
+from gap_flights import HOVER, VEHICLE, flight, fly, study
 
 FLIGHTS = 8  #: pairs of flights
 CHANCE = 1e-3  #: that a right model leaves the limits of a comparison somewhere
 #: fraction by which a right model may be off where the scatter allows less, as the loop's model is one of small signals
 #: and the turbulence is drawn once a sample; chosen, 1 dB
 LOOP_ERROR = 0.25
+PLATFORM = KINDS.index("over platform")
 IN_AIR = [p for p in range(len(KINDS)) if p != GROUND]
 
 
@@ -67,7 +69,7 @@ def added_and_expected(effect, parts, phases):
         gap = nominal_study().residual(shaken, [t.active() for t in mean_of(parts)])
         sums = block_sums(shaken, gap, VEHICLE)
         before = block_sums(without, nominal_study().residual(without), VEHICLE)
-        expected = random_power(nominal_study(), shaken, random_of(parts), sums)
+        expected = random_power(nominal_study(), shaken, random_of(parts))
         rows, rows_before = np.isin(sums.phase, phases), np.isin(before.phase, phases)
         of_calm = per_sample(before, before.power, rows_before)
         out.append((per_sample(sums, sums.power, rows) - of_calm, per_sample(sums, expected, rows), of_calm))
@@ -101,3 +103,41 @@ def test_the_torque_of_a_wake_is_that_of_simulated_pairs():
     parts, values = with_turbulence("downwash", 0.1, 0.6, width=0.0)
     added, expected, _ = added_and_expected(("downwash", values), parts, IN_AIR)
     assert_as_expected(added[:, :, TORQUE], expected[:, :, TORQUE], LOOP_ERROR)
+
+
+def test_air_that_is_unsteady_near_the_ground_shakes_there_alone():
+    """Roll and pitch from 2 to 25 Hz: over the platform as simulated, and in the hover hardly more than without."""
+    parts, values = with_turbulence("ground_effect", 0.3, 1.0)
+    added, expected, _ = added_and_expected(("ground_effect", values), parts, [PLATFORM])
+    assert_as_expected(added[:, 2:5, 3:5], expected[:, 2:5, 3:5], LOOP_ERROR)
+    high, expected_high, of_calm = added_and_expected(("ground_effect", values), parts, [HOVER])
+    assert np.abs(high[:, 2:5, 3:5].mean(axis=0) / of_calm[:, 2:5, 3:5].mean(axis=0)).max() < 0.05
+    assert (expected_high[:, 2:5, 3:5].mean(axis=0) / of_calm[:, 2:5, 3:5].mean(axis=0)).max() < 0.15
+
+
+def test_at_rest_noise_of_the_imu_is_that_of_simulated_pairs():
+    noise = with_values("imu_noise", factor=2.0)
+    added, expected, _ = added_and_expected(("imu_noise", {"factor": 2.0}), [noise], [GROUND])
+    assert_as_expected(added[:, :, FORCE], expected[:, :, FORCE])
+    assert_as_expected(added[:, 2:, TORQUE], expected[:, 2:, TORQUE])
+
+
+def test_noise_twice_as_loud_adds_three_times_the_power_of_the_declared_in_each_band():
+    """In the air and at rest, where a bin of the spectra is wider than the lowest two bands."""
+    made = flight(20.0, resting_s=4.0)
+    noise = with_values("imu_noise", factor=2.0)
+    sums = block_sums(made, np.zeros((len(made), 13)), VEHICLE)
+    power = random_power(study(), made, [noise])
+    for rows in (sums.phase == GROUND, sums.phase == HOVER):
+        expected = 3.0 * sensor_rms(VEHICLE) ** 2
+        np.testing.assert_allclose(per_sample(sums, power, rows)[:, FORCE], expected[:, FORCE], rtol=0.03)
+        np.testing.assert_allclose(per_sample(sums, power, rows)[3:, TORQUE], expected[3:, TORQUE], rtol=0.03)
+
+
+def test_a_passing_effect_adds_its_power_in_its_seconds_alone():
+    made = flight(20.0, name="shaken")
+    noise = with_values("imu_noise", factor=2.0)
+    sums = block_sums(made, np.zeros((len(made), 13)), VEHICLE)
+    whole, part = (random_power(study(), made, [replace(noise, gate=g)])[:, 0, 5, 0].sum()
+                   for g in ((), (("shaken", 5.0, 9.0), ("another", 0.0, 20.0))))
+    assert part == pytest.approx(0.2 * whole) and len(sums.phase) > 5

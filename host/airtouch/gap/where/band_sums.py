@@ -115,12 +115,12 @@ def block_bounds(flight: Flight) -> list[tuple[int, int]]:
             for here, _ in _blocks_with_samples(flight, everywhere, start, stop)]
 
 
-def samples_within(flight: Flight, acts: np.ndarray, vehicle: Vehicle) -> np.ndarray:
-    """Samples (b, r) of the blocks of `block_sums`, in each of REGIMES, at which acts (n,) is true."""
-    member = regimes(flight, vehicle)
-    rows = [mask @ acts[start:stop][here] for start, stop in stretches(flight)
+def sums_over_blocks(flight: Flight, values: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+    """Sums (b, r, ...) of values (n, ...) over the blocks of `block_sums`, in each of REGIMES."""
+    member, flat = regimes(flight, vehicle), values.reshape(len(values), -1)
+    rows = [mask @ flat[start:stop][here] for start, stop in stretches(flight)
             for here, mask in _blocks_with_samples(flight, member, start, stop)]
-    return np.array(rows).reshape(-1, len(REGIMES))
+    return np.array(rows).reshape(-1, len(REGIMES), *values.shape[1:])
 
 
 def _blocks_with_samples(flight: Flight, member: np.ndarray, start: int, stop: int,

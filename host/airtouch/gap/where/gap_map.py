@@ -121,7 +121,7 @@ def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
         return gap
     sensor = sensor_rms(study.vehicle) ** 2
     noise = np.minimum(sensor * gap.weight[:, :, None, None], gap.power)
-    return replace(gap, power=noise + np.abs(gap.power - noise - random_power(study, flight, random, gap)))
+    return replace(gap, power=noise + np.abs(gap.power - noise - random_power(study, flight, random)))
 
 
 def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,

@@ -1,6 +1,7 @@
 """The power that random effects add to the block sums of a flight.
 
-Their spectra are those of measured minus replayed (`random_effects.replayed_power`), whose squares the map sums.
+Their spectra are those of measured minus replayed (`random_effects.replayed_power`), whose squares the map sums. A bin
+counts in the bands that it reaches into, and a sample has the mean of the blocks of spectra around it.
 """
 
 from collections.abc import Sequence
@@ -10,26 +11,64 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.random_effects import replayed_power
+from airtouch.gap.flights.blocks import hann_window
 from airtouch.gap.flights.flight import GROUND, Flight
-from airtouch.gap.signals.channels import inside
-from airtouch.gap.signals.spectra import AIR, REST, frequencies
+from airtouch.gap.signals.channels import COUNT, inside
+from airtouch.gap.signals.spectra import AIR, LENGTH, REST, frequencies
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
-from airtouch.gap.where.band_sums import Sums, samples_within
-from airtouch.gap.where.filter_bank import gains
+from airtouch.gap.where.band_sums import sums_over_blocks
+from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
+
+WITHIN_BIN = 16  #: frequencies at which the gains of the bands are averaged over a bin; chosen
+LEAST_WEIGHT = 1e-3  #: of blocks' windows, over the largest, below which they say nothing of a sample; chosen
 
 
-def random_power(study: Study, flight: Flight, terms: Sequence[Term], of_blocks: Sums) -> np.ndarray:
+def random_power(study: Study, flight: Flight, terms: Sequence[Term]) -> np.ndarray:
     """Sums of squares (b, r, bands, COUNT) that random effects add to the block sums of a flight.
 
-    An effect adds its mean power in the flight at each sample at which it acts, and none at the others.
+    A passing effect adds them in its seconds alone.
     """
-    data, out = Data(study, [flight]), np.zeros_like(of_blocks.power)
+    data, per_sample = Data(study, [flight]), np.zeros((len(flight), len(MAP_BANDS_HZ), COUNT))
     for term in terms:
-        power = replayed_power(data, replace(term, gate=()))[0]
-        acting = samples_within(flight, inside(term.gate, flight), study.vehicle) if term.gate else of_blocks.weight
-        for rows, state in ((of_blocks.phase == GROUND, REST), (of_blocks.phase != GROUND, AIR)):
-            if len(power[state]):
-                density = gains(frequencies(state)) ** 2 * frequencies(state)[1]
-                out[rows] += acting[rows][:, :, None, None] * (density @ power[state].mean(axis=0))
-    return out
+        (power,) = replayed_power(data, replace(term, gate=()))
+        acts = inside(term.gate, flight) if term.gate else np.ones(len(flight), bool)
+        for state, in_state in ((REST, flight.phase == GROUND), (AIR, flight.phase != GROUND)):
+            samples = acts & in_state
+            per_sample[samples] += _per_sample(data, state, power[state], term)[samples]
+    return sums_over_blocks(flight, per_sample, study.vehicle)
+
+
+def _per_sample(data: Data, state: str, power: np.ndarray, term: Term) -> np.ndarray:
+    """Mean squares (n, bands, COUNT) at each sample from the power (blocks, bins, COUNT) of the blocks around it.
+
+    Where there are none it is the mean of all blocks; 0 without a block.
+    """
+    total, weight = np.zeros((len(data.flights[0]), len(MAP_BANDS_HZ), COUNT)), np.zeros(len(data.flights[0]))
+    if not len(power):
+        return total
+    in_bands = _share_of_bins(state, known_shape=bool(term.signature.spectrum)) @ power
+    window = hann_window(LENGTH[state])[0][:, 0] ** 2
+    for first, of_block in zip(data.block_starts[0][state], in_bands, strict=True):
+        here = slice(first, first + LENGTH[state])
+        total[here] += window[:, None, None] * of_block
+        weight[here] += window
+    known = weight > LEAST_WEIGHT
+    total[known] /= weight[known, None, None]
+    total[~known] = in_bands.mean(axis=0)
+    return total
+
+
+def _share_of_bins(state: str, known_shape: bool) -> np.ndarray:
+    """Mean square (bands, bins) in each band for a power of 1 in a bin, Hz.
+
+    A bin reaches half its width to both sides. Of the lowest and the highest a half lies in the band of the log: a
+    measured spectrum has half the density there (`short_time_spectra`), one of a known shape all of it.
+    """
+    f = frequencies(state)
+    within = f[1] * ((np.arange(WITHIN_BIN) + 0.5) / WITHIN_BIN - 0.5)
+    at = f[:, None] + within
+    inside_log = (at > 0.0) & (at < f[-1])
+    passed = (gains(at.ravel()) ** 2).reshape(-1, *at.shape) * inside_log
+    width = np.full(len(f), f[1]) if not known_shape else f[1] * inside_log.mean(axis=1)
+    return passed.sum(axis=2) / inside_log.sum(axis=1) * width
