@@ -1,12 +1,12 @@
 """The curves of a report: signals of the headline's cell, spectra, commands."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from airtouch.gap.evidence import random_effects
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.random_effects import replayed_power
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_over
 from airtouch.gap.nominal.build_study import sensor_noise
@@ -250,9 +250,7 @@ def _power_after(study: Study, residuals: Sequence[FlightResidual], effects: Seq
     random = random_of(effects)
     if not random:
         return _mean_of_known(powers)
-    # as the curves have it: with their floor, and torque as the replay leaves it
-    replayed = replace(study, response=None, floor=replace(study.floor, power={**study.floor.power, AIR: floor}))
-    of_random = [sum(random_effects.extra_power(data, t)[0][AIR].mean(axis=0) for t in random)
-                 for data in (Data(replayed, [r.flight]) for r in residuals)]
+    of_random = [sum(replayed_power(data, t)[0][AIR].mean(axis=0) for t in random)
+                 for data in (Data(study, [r.flight]) for r in residuals)]
     expected = _mean_of_known([np.where(np.isfinite(p), x, np.nan) for p, x in zip(powers, of_random, strict=True)])
     return _mean_of_known(powers) * floor / (floor + expected)
