@@ -191,6 +191,25 @@ def test_adapt_takes_files_alone(log, tmp_path):
             at.adapt(flights, tmp_path / "mine.npz")
 
 
+def test_plots_of_a_result_are_figures_to_restyle_and_save(path, tmp_path):
+    """Drawn anew at each call; to ask for them changes nothing else."""
+    pytest.importorskip("matplotlib")
+    measured = at.gap.measure(path, plots=True)
+    plots = at.gap.plots(measured)
+    assert list(plots) == ["signal", "spectra", "commands"]
+    for name, figure in plots.items():
+        assert figure.axes[-1].get_xlabel() == ("time, s" if name == "signal" else "frequency, Hz")
+        figure.axes[0].set_title("of a paper")
+        figure.savefig(tmp_path / f"{name}.svg")
+        assert "of a paper" in (tmp_path / f"{name}.svg").read_text()  # a comment beside the glyphs
+    assert at.gap.plots(measured)["signal"].axes[0].get_title() == ""
+    assert len(plots["spectra"].axes) == len(measured.pictures.spectra) > 0
+    without = at.gap.measure(path)
+    assert without == measured
+    with pytest.raises(AirTouchError, match="plots=True"):
+        at.gap.plots(without)
+
+
 @pytest.mark.parametrize("function", [at.gap.measure, at.gap.diagnose])
 def test_logs_of_two_vehicles_need_one_to_be_named(log, function):
     other = log.with_columns({}, vehicle="crazyflie-2.1-brushless")

@@ -48,6 +48,7 @@ WORKS = [("evaluate", "{flight}", "--speed", "0.3"), ("evaluate", "{flight}", "-
 TRAINS = [("demo", "--out", "{out}/demo"), ("train", "{flight}", "--out", "{out}/m.npz"),
           ("adapt", "{flight}", "--out", "{out}/m.npz"), ("twin", "{flight}", "--out", "{out}/twin")]
 DRAWS = {("map", "{flight}", "--truth", "--out", "{out}/m.geojson"): "map",
+         ("gap", "measure", "{flight}", "--plots", "{out}/plots"): "plots",
          ("gap", "blind", "run", "{out}/set", "-n", "1"): "plots"}
 
 

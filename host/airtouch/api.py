@@ -1,9 +1,9 @@
 """The functions of `import airtouch as at`.
 
 `at.read`, `at.write`, `at.to_pandas`, `at.from_pandas`, `at.detect`, `at.evaluate`, `at.simulate`, `at.adapt`,
-`at.gap.diagnose` and `at.gap.measure`. A flight is a file name, a `FlightLog` or a pandas table with the log's column
-names; `at.adapt` takes files and folders alone. Heavy modules are imported at their first use, so `import airtouch` is
-fast.
+`at.gap.diagnose`, `at.gap.measure` and `at.gap.plots`. A flight is a file name, a `FlightLog` or a pandas table with
+the log's column names; `at.adapt` takes files and folders alone. Heavy modules are imported at their first use, so
+`import airtouch` is fast.
 """
 
 import numbers
@@ -19,6 +19,7 @@ from airtouch.errors import AirTouchError, in_python, python_words
 from airtouch.logs.flight_log import COLUMNS, FlightLog
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
     from airtouch.detector.registry import Detector
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
 
     Flight: TypeAlias = str | Path | FlightLog | DataFrame
 
-__all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "read", "simulate", "to_pandas",
-           "write"]
+__all__ = ["adapt", "detect", "diagnose", "evaluate", "from_pandas", "measure", "plots", "read", "simulate",
+           "to_pandas", "write"]
 
 
 @in_python
@@ -190,12 +191,12 @@ def simulate(scenario: "str | Path | Scenario", flights: int = 1, *, vehicle: "V
 @in_python
 def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
              baseline: "Flight | Iterable[Flight]" = (), *, without: Iterable[str] = (),
-             report: str | Path | None = None, force: bool = False) -> "Diagnosis":
+             report: str | Path | None = None, plots: bool = False, force: bool = False) -> "Diagnosis":
     """Find the unmodelled effect that the flights have in common, and the fraction of the gap that it explains.
 
     vehicle: a built-in name or .toml file; that of the logs if left out, and crazyflie-2.1-flow, with a warning,
     where the first names none or one of which no file is known. baseline: nominal flights. without: effects to exclude.
-    report: HTML file to write.
+    report: HTML file to write. plots: whether `at.gap.plots` is to draw the result.
     The result's `plain()` is the JSON of `airtouch gap diagnose`.
     Raises AirTouchError for flights that cannot be used, for logs (the baseline's too) that name two vehicles where
     none is given, and for a report that exists, without `force`.
@@ -208,7 +209,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
         check_free(Path(report), force)
     logs, nominal = _logs(flights), _logs(baseline)
     diagnosis = module.diagnose(logs, _vehicle(vehicle, [*logs, *nominal]), nominal, without=without,
-                                pictures=report is not None)
+                                pictures=plots or report is not None)
     if report is not None:
         gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
     return diagnosis
@@ -216,12 +217,33 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
 
 @in_python
 def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path | None" = None,
-            baseline: "Flight | Iterable[Flight]" = ()) -> "Measurement":
+            baseline: "Flight | Iterable[Flight]" = (), *, plots: bool = False) -> "Measurement":
     """The map of the gap between flights and the vehicle's model, without a cause. Arguments as in `diagnose`."""
     import airtouch.gap.measurement as module
 
     logs, nominal = _logs(flights), _logs(baseline)
-    return module.measure(logs, _vehicle(vehicle, [*logs, *nominal]), nominal)
+    craft = _vehicle(vehicle, [*logs, *nominal])
+    measurement = module.measure(logs, craft, nominal)
+    return replace(measurement, pictures=module.pictures_of_measurement(measurement, logs, craft)) if plots \
+        else measurement
+
+
+@in_python
+def plots(result: "Diagnosis | Measurement") -> "dict[str, Figure]":
+    """The plots of a report as matplotlib figures, of what `diagnose` or `measure` returned with `plots=True`.
+
+    Keys: "signal", of the channel and band of the answer; "spectra", of the gap; "commands", spectra of the motor
+    commands. One that there is nothing for is left out. Each is drawn anew at each call, without pyplot, so restyle it
+    by its `axes` and save it by `savefig`, as PDF or SVG too. Raises AirTouchError for a result without curves, and
+    without the extra 'plots'.
+    """
+    from airtouch.extras import need
+    from airtouch.report import gap_report
+
+    need("plots", "a plot")
+    if result.pictures is None:
+        raise AirTouchError("this result has no curves to plot; call diagnose or measure with plots=True")
+    return gap_report.figures(result.pictures)
 
 
 @in_python

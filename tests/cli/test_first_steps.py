@@ -16,7 +16,7 @@ from airtouch.detector.shared import sensors
 from airtouch.errors import AirTouchError, unknown
 from airtouch.logs.files import check_free
 from airtouch.logs.flight_log import FlightLog
-from airtouch.report import figures
+from airtouch.report import evaluation_figures as figures
 from airtouch.report.style import GREEN
 from airtouch.simulation import scenario
 from airtouch.simulation.flight import refuse_off

@@ -127,7 +127,7 @@ def test_the_picture_is_a_map_platform_scale_start_and_end():
     xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.zeros(500)])
     points = [EdgePoint(200, 2.0, "entry", 0.0, 0.0, 0.02), EdgePoint(300, 3.0, "exit", 1.0, 0.0, 0.02)]
     one_pass = Platform(Point(0.0, 0.0), Point(1.0, 0.0), None, None, 0.02)
-    figure = map_figure.figure_of(EdgeMap(xy, points, [one_pass], "logged", 0.0, 0.1), "a flight")
+    figure = map_figure.edge_map(EdgeMap(xy, points, [one_pass], "logged", 0.0, 0.1), "a flight")
     (ax,) = figure.axes
     labels = {text.get_text() for text in figure.legends[0].get_texts()}
     assert {"start", "end", "track", "platform (its width is not known)", "entry (1)", "exit (1)"} <= labels
@@ -148,7 +148,7 @@ def test_the_scale_bar_covers_nothing_of_a_flight_that_begins_at_the_lower_left(
     for turn in (0.0, 0.5, 1.0):
         along = np.linspace(0.0, 3.0, 500)
         xy = np.column_stack([along * np.cos(turn), along * np.sin(turn)])
-        (ax,) = map_figure.figure_of(EdgeMap(xy, [], [], "logged", 0.0, 0.1), "a flight").axes
+        (ax,) = map_figure.edge_map(EdgeMap(xy, [], [], "logged", 0.0, 0.1), "a flight").axes
         (text,) = [t for t in ax.texts if t.get_text()]
         top = ax.transData.inverted().transform(text.get_window_extent())[1, 1]
         assert max(top, ax.lines[-1].get_ydata().max()) < xy[:, 1].min()
@@ -164,7 +164,7 @@ def test_the_band_of_an_outline_is_named_in_the_legend_and_reaches_two_sigma_bey
     xy = np.column_stack([np.linspace(-2.0, 3.0, 500), np.full(500, 0.5)])
     sides = (LineString([(x, 0.0), (x, 1.0)]) for x in (0.0, 1.0))
     square = Platform(*sides, box(0.0, 0.0, 1.0, 1.0), None, 0.05)
-    figure = map_figure.figure_of(EdgeMap(xy, [], [square], "logged", 0.0, 0.1), "a flight")
+    figure = map_figure.edge_map(EdgeMap(xy, [], [square], "logged", 0.0, 0.1), "a flight")
     (band,) = (patch for patch in figure.axes[0].patches if "2 sigma" in patch.get_label())
     assert band.get_label() in {text.get_text() for text in figure.legends[0].get_texts()}
     corners = band.get_path().vertices

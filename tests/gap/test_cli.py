@@ -50,6 +50,24 @@ def test_measure_writes_json_and_report(folder, tmp_path):
     assert run("measure", f"{folder}/real_0*", "--json", out, "--force").exit_code == 0
 
 
+def test_plots_are_the_pages_as_vector_files(folder, tmp_path):
+    """One file a plot of the page and format; what is there is not replaced, and told before the work."""
+    page, plots = tmp_path / "out.html", tmp_path / "new" / "plots"
+    result = run("measure", folder / "real_0.csv.gz", "--report", page, "--plots", plots)
+    assert result.exit_code == 0, result.output
+    files = sorted(plots.iterdir())
+    assert len(files) == 2 * page.read_text().count("<img ") == 6
+    assert all(file.read_bytes().startswith(b"%PDF" if file.suffix == ".pdf" else b"<?xml") for file in files)
+    assert all(f"written: {file}" in result.output.splitlines() for file in files)
+    for command_name in ("measure", "diagnose"):
+        repeat = run(command_name, folder / "absent.csv", "--plots", plots)
+        assert isinstance(repeat.exception, AirTouchError) and "use --force" in str(repeat.exception)
+    assert isinstance(run("measure", folder / "absent.csv", "--plots", tmp_path / "none").exception, AirTouchError)
+    assert not (tmp_path / "none").exists()
+    each = run("diagnose", folder / "real_0.csv.gz", "--each", "--plots", tmp_path / "each")
+    assert "leave --each out" in str(each.exception)
+
+
 def test_folders_files_and_patterns(folder):
     names = [p.name for p in files_of([str(folder)])]
     assert names == ["nominal_2.csv.gz", "nominal_3.csv.gz", "real_0.csv.gz", "real_1.csv.gz"]

@@ -10,6 +10,7 @@ from airtouch.detector.evaluation.data.dataset import Condition
 from airtouch.detector.evaluation.evaluate import Result
 from airtouch.detector.evaluation.score import score_flight
 from airtouch.detector.evaluation.score_report import (
+    Reliability,
     ShownFlight,
     hit_curve,
     reliability_of,
@@ -21,7 +22,7 @@ from airtouch.detector.trace import Detection, Trace
 from airtouch.errors import AirTouchError
 from airtouch.logs import Edge
 from airtouch.logs.flight_log import FlightLog
-from airtouch.report import figures
+from airtouch.report import evaluation_figures as figures
 from airtouch.report.columns import COLUMNS, cell
 from airtouch.report.evaluation_report import answer, in_words, write_report
 from html_page import PageReader
@@ -77,28 +78,43 @@ def test_words_say_misses_and_false_edges():
 def test_plots_are_made_of_whatever_is_there():
     flight = flight_shown()
     no_trace = Trace(np.full(N, np.nan), [])
-    for image in (figures.flight(flight.log, no_trace, None, {}), figures.reliability({"none": reliability_of([])}),
-                  figures.reliability({"paper": reliability_of([flight.score])}),
-                  figures.error_distribution({"paper": hit_curve([flight.score])})):
-        assert image.startswith(b"\x89PNG") and len(image) > 5000
+    for figure in (figures.flight(flight.log, no_trace), figures.reliability({"none": reliability_of([])}),
+                   figures.reliability({"paper": reliability_of([flight.score])}),
+                   figures.error_distribution({"paper": hit_curve([flight.score])})):
+        figure.draw_without_rendering()
+        assert all(ax.get_ylabel() for ax in figure.axes) and figure.axes[-1].get_xlabel()
 
 
-def figure_of_flight(monkeypatch, edges):
-    """The figure of a flight's plot, before it is made a PNG."""
-    drawn, flight = [], flight_shown()
-    monkeypatch.setattr(figures, "png", lambda figure: drawn.append(figure) or b"")
-    figures.flight(flight.log, flight.trace, edges, {})
-    return drawn[0]
+def test_each_detector_has_a_curve_of_its_edges_and_one_of_its_probability():
+    """Of one edge in two hit, and of none; probabilities of which as many are right as stated lie on the diagonal."""
+    hits = {name: hit_curve([flight_shown(detections=d).score]) for name, d in (("best", DETECTIONS), ("paper", ()))}
+    (ax,) = figures.error_distribution(hits).axes
+    assert [line.get_ydata().max() for line in ax.get_lines()] == [0.5, 0.0]
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["best, 2 edges", "paper, 2 edges"]
+    assert ax.get_xlabel() == "distance error, m"
+    right = Reliability(np.array([0.25, 0.75]), np.array([0.25, 0.75]), np.array([0.5, 0.5]), 0.0)
+    (ax,) = figures.reliability({"best": right, "paper": right}).axes
+    diagonal, *curves = ax.get_lines()
+    assert len(curves) == len(ax.collections) == 2
+    for curve in (diagonal, *curves):
+        np.testing.assert_allclose(curve.get_xdata(), curve.get_ydata())
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["perfect", "best, ECE 0.000", "paper, ECE 0.000"]
+
+
+def figure_of_flight(edges):
+    """The plot of a flight with these true edges."""
+    flight = flight_shown()
+    return figures.flight(flight.log, flight.trace, edges)
 
 
 @pytest.mark.parametrize(("edges", "explained"), [(EDGES, True), (None, False), ([], False)])
-def test_true_edges_are_explained_where_they_are_drawn(monkeypatch, edges, explained):
-    *_, lowest = (ax for ax in figure_of_flight(monkeypatch, edges).axes if ax.get_xlabel())
+def test_true_edges_are_explained_where_they_are_drawn(edges, explained):
+    *_, lowest = (ax for ax in figure_of_flight(edges).axes if ax.get_xlabel())
     assert lowest.get_xlabel().startswith("time, s") and ("dashed green" in lowest.get_xlabel()) is explained
 
 
-def test_band_power_has_a_scale_beside_it_and_all_panes_keep_one_time_axis(monkeypatch):
-    figure = figure_of_flight(monkeypatch, EDGES)
+def test_band_power_has_a_scale_beside_it_and_all_panes_keep_one_time_axis():
+    figure = figure_of_flight(EDGES)
     figure.draw_without_rendering()
     (scale,) = (ax for ax in figure.axes if "dB" in ax.get_ylabel())
     (powers,) = (ax for ax in figure.axes if ax.images)

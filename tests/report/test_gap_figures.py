@@ -1,4 +1,4 @@
-"""The plots of a gap report: their panes, lines and labels, before they are made a PNG."""
+"""The plots of a gap report: their panes, lines and labels."""
 
 import re
 import unicodedata
@@ -16,19 +16,6 @@ TIME_S = np.arange(100) * 0.1
 FREQUENCY_HZ = np.linspace(0.0, 50.0, 51)
 
 
-@pytest.fixture
-def drawn(monkeypatch):
-    """Draws a plot and gives its figure."""
-    figures = []
-    monkeypatch.setattr(gap_figures, "png", lambda figure, dpi: figures.append(figure) or b"")
-
-    def draw(plot, *arguments):
-        plot(*arguments)
-        return figures[-1]
-
-    return draw
-
-
 def lines(ax):
     """The lines of a pane by their labels, each (points,)."""
     return {line.get_label(): line.get_ydata() for line in ax.get_lines()}
@@ -40,55 +27,55 @@ def signal(measured=True, after=True, phase=None):
                   np.full(100, 2.0), np.full(100, 0.5) if after else None, np.full(100, 0.25))
 
 
-def test_signal_has_measured_and_models_above_and_their_differences_below(drawn):
-    above, below = drawn(gap_figures.signals, signal()).axes
+def test_signal_has_measured_and_models_above_and_their_differences_below():
+    above, below = gap_figures.signals(signal()).axes
     assert {name: y[0] for name, y in lines(above).items()} == {"measured": 5.0, "model": 3.0, "model with effect": 4.5}
     assert {name: y[0] for name, y in lines(below).items()} == {"gap before": 2.0, "gap after": 0.5}
     assert "floor" in below.get_legend_handles_labels()[1]
     assert above.get_ylabel() == "forward force\nm/s²" and below.get_xlabel() == "time, s"
 
 
-def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown(drawn):
+def test_the_floor_steps_with_the_phases_and_is_not_drawn_where_it_is_unknown():
     floor = np.repeat([0.25, 1.0, np.nan], [50, 25, 25])
-    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=floor)).axes
+    (ax,) = gap_figures.signals(replace(signal(measured=False), floor=floor)).axes
     (grey,) = ax.collections
     assert not len(grey.get_facecolor()) and grey.get_edgecolor()[0, 3] == 1.0  # lines, that tint no curve
     for inside, point in ((True, (4.0, 0.2)), (False, (4.0, 0.5)), (True, (6.0, -0.9)), (False, (8.0, 0.0))):
         assert any(path.contains_point(point) for path in grey.get_paths()) is inside, point
-    (ax,) = drawn(gap_figures.signals, replace(signal(measured=False), floor=np.full(100, np.nan))).axes
+    (ax,) = gap_figures.signals(replace(signal(measured=False), floor=np.full(100, np.nan))).axes
     assert not ax.collections and "floor" not in ax.get_legend_handles_labels()[1]
 
 
 @pytest.mark.parametrize("worst", [-9.0, 9.0])
-def test_every_curve_is_in_view_where_it_is_largest(drawn, worst):
+def test_every_curve_is_in_view_where_it_is_largest(worst):
     """The effect named does worst at lift-off, in 2 % of a flight; a spike of a fifth of that sets no scale."""
     before = np.full(1000, 2.0)
     after, spiked = np.zeros(1000), np.zeros(1000)
     after[100:120], spiked[100:104] = worst, worst
     curves = Signal("a.csv", "force_x", (0.0, 2.0), "m/s^2", np.arange(1000) * 0.01, np.zeros(1000, int),
                     np.zeros(1000), before, after, np.full(1000, 4.0))
-    for ax in drawn(gap_figures.signals, curves).axes:
+    for ax in gap_figures.signals(curves).axes:
         low, high = ax.get_ylim()
         for name, curve in lines(ax).items():
             assert low < curve.min() and curve.max() < high, name
-    assert drawn(gap_figures.signals, curves).axes[1].get_ylim()[0] < -4.0  # of the floor
-    for ax in drawn(gap_figures.signals, replace(curves, after=spiked)).axes:
+    assert gap_figures.signals(curves).axes[1].get_ylim()[0] < -4.0  # of the floor
+    for ax in gap_figures.signals(replace(curves, after=spiked)).axes:
         assert np.abs(ax.get_ylim()).max() < 9.0
 
 
 @pytest.mark.parametrize("size", [0.003, 10.0, 100.0, 1000.0])
-def test_no_label_leaves_the_plot(drawn, size):
+def test_no_label_leaves_the_plot(size):
     curve = size * np.sin(TIME_S)
-    figure = drawn(gap_figures.signals, replace(signal(), measured=3.0 * curve, before=curve, after=-curve))
+    figure = gap_figures.signals(replace(signal(), measured=3.0 * curve, before=curve, after=-curve))
     figure.draw_without_rendering()
     for ax in figure.axes:
         assert ax.yaxis.label.get_window_extent().x0 >= 0.0
 
 
-def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn):
+def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal():
     """It is broader, and drawn first."""
     equal = replace(signal(), after=np.full(100, 2.0))
-    for ax, before, after in zip(drawn(gap_figures.signals, equal).axes, ("model", "gap before"),
+    for ax, before, after in zip(gap_figures.signals(equal).axes, ("model", "gap before"),
                                  ("model with effect", "gap after"), strict=True):
         drawn_lines = {line.get_label(): (i, line.get_linewidth()) for i, line in enumerate(ax.get_lines())}
         assert drawn_lines[before][0] < drawn_lines[after][0]
@@ -96,24 +83,24 @@ def test_the_gap_before_shows_behind_the_gap_after_where_the_two_are_equal(drawn
 
 
 @pytest.mark.parametrize("measured", [True, False])
-def test_height_is_below_the_signal_of_a_ground_effect(drawn, measured):
-    figure = drawn(gap_figures.signals, replace(signal(measured), height_m=np.full(100, 0.08)))
+def test_height_is_below_the_signal_of_a_ground_effect(measured):
+    figure = gap_figures.signals(replace(signal(measured), height_m=np.full(100, 0.08)))
     *_, gap, height = figure.axes
     assert len(figure.axes) == 2 + measured and set(lines(gap)) == {"gap before", "gap after"}
     assert {y[0] for y in lines(height).values()} == {0.08}
     assert (height.get_ylabel(), height.get_xlabel(), gap.get_xlabel()) == ("height\nm", "time, s", "")
 
 
-def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line(drawn):
-    (only,) = drawn(gap_figures.signals, signal(measured=False, after=False)).axes
+def test_signal_without_a_sensor_has_the_differences_alone_and_without_an_effect_one_line():
+    (only,) = gap_figures.signals(signal(measured=False, after=False)).axes
     assert set(lines(only)) == {"gap"} and only.get_ylabel() == "measured - model\nm/s²"
 
 
-def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
+def test_phases_behind_the_signal_have_the_colours_of_its_caption():
     """Take-off and landing alike, over a platform another; hover has none."""
     kinds = ("take-off", "hover", "over platform", "landing")
     phase = np.repeat([KINDS.index(k) for k in kinds], 25)
-    (ax,) = drawn(gap_figures.signals, signal(measured=False, phase=phase)).axes
+    (ax,) = gap_figures.signals(signal(measured=False, phase=phase)).axes
     spans = [p for p in ax.patches if p.get_label() != "floor"]
     first, second, third = (p.get_facecolor() for p in spans)
     assert first == third != second
@@ -122,11 +109,11 @@ def test_phases_behind_the_signal_have_the_colours_of_its_caption(drawn):
 
 
 @pytest.mark.parametrize("after", [True, False])
-def test_spectra_have_a_pane_for_each_channel(drawn, after):
+def test_spectra_have_a_pane_for_each_channel(after):
     power = np.full(51, 4.0)
     shown = [Spectrum(name, unit, power, power / 2.0 if after else None, power / 4.0)
              for name, unit in (("force_x", "m/s^2"), ("torque_z", "rad/s^2"))]
-    figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
+    figure = gap_figures.spectra(FREQUENCY_HZ, shown)
     assert [(ax.get_title(loc="left"), ax.get_ylabel()) for ax in figure.axes] == [
         ("forward force", "(m/s²)²/Hz"), ("yaw torque", "(rad/s²)²/Hz")]
     expected = {"floor": 1.0, "before": 4.0, "after": 2.0} if after else {"floor": 1.0, "gap": 4.0}
@@ -136,10 +123,10 @@ def test_spectra_have_a_pane_for_each_channel(drawn, after):
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(expected)
 
 
-def test_powers_are_labelled_in_plain_text(drawn):
+def test_powers_are_labelled_in_plain_text():
     """Without formulas, whose parser takes a second to begin."""
     power = np.geomspace(1e-12, 1e3, 51)
-    (ax,) = drawn(gap_figures.spectra, FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    (ax,) = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
     for y, label in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True):
         sign, digits = re.fullmatch("10(⁻?)(.+)", label.get_text()).groups()
         exponent = int("".join(str(unicodedata.digit(c)) for c in digits))
@@ -147,10 +134,10 @@ def test_powers_are_labelled_in_plain_text(drawn):
     assert len(ax.get_yticks()) > 2
 
 
-def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others(drawn):
+def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others():
     power = np.full(51, 4.0)
     shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]
-    figure = drawn(gap_figures.spectra, FREQUENCY_HZ, shown)
+    figure = gap_figures.spectra(FREQUENCY_HZ, shown)
     assert [set(lines(ax)) for ax in figure.axes] == [{"gap"}, {"gap", "floor"}]
     assert [ax.get_ylabel() for ax in figure.axes] == ["N²/Hz", "(m/s²)²/Hz"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["floor", "gap"]
@@ -158,10 +145,10 @@ def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that
 
 @pytest.mark.parametrize(("least", "most"), [
     (2e-9, 7e-9), (3.0, 3.0), (5e-10, 5e-9), (9e-7, 1.1e-4), (1e-12, 1e-12), (1e-2, 1e-1), (1e-11, 1e-6), (1e-12, 1e9)])
-def test_two_powers_at_least_can_be_read_and_no_more_than_fit(drawn, least, most):
+def test_two_powers_at_least_can_be_read_and_no_more_than_fit(least, most):
     """Of the labels in view; the data stay in view too, and take half of the pane where they span a decade."""
     power = np.geomspace(least, most, 51)
-    (ax,) = drawn(gap_figures.spectra, FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    (ax,) = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
     low, high = ax.get_ylim()
     labels = [t.get_text() for y, t in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True) if low <= y <= high]
     assert 2 <= len(set(labels)) == len(labels) <= 5
@@ -170,10 +157,10 @@ def test_two_powers_at_least_can_be_read_and_no_more_than_fit(drawn, least, most
 
 
 @pytest.mark.parametrize("nominal", [{}, {"roll": np.ones(5), "yaw": np.ones(5)}])
-def test_commands_have_a_pane_for_each_axis_and_nominal_flights_beside(drawn, nominal):
+def test_commands_have_a_pane_for_each_axis_and_nominal_flights_beside(nominal):
     curves = SimpleNamespace(frequency_hz=np.arange(1.0, 6.0), flown={"roll": np.full(5, 2.0), "yaw": np.full(5, 3.0)},
                              nominal=nominal)
-    figure = drawn(gap_figures.commands, curves)
+    figure = gap_figures.commands(curves)
     assert [ax.get_title(loc="left") for ax in figure.axes] == ["roll command", "yaw command"]
     for ax, power in zip(figure.axes, (2.0, 3.0), strict=True):
         assert lines(ax)["these flights"][0] == power

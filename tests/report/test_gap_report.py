@@ -190,8 +190,8 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
 
 def test_page_of_a_measurement(pushed_flights, tmp_path):
     path, gap = tmp_path / "gap.html", measure(pushed_flights, VEHICLE)
-    pictures = pictures_of_measurement(gap, pushed_flights, VEHICLE)
-    gap_report.write_measurement(path, gap, pictures, command="airtouch gap measure x")
+    gap = replace(gap, pictures=pictures_of_measurement(gap, pushed_flights, VEHICLE))
+    gap_report.write_measurement(path, gap, command="airtouch gap measure x")
     text, page = checked(path)
     assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
     assert sum(v.startswith("data:") for v in page.loaded) == 3 and "Which effect" not in text and "→" not in text

@@ -30,8 +30,8 @@ from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.errors import in_one_line
 from airtouch.logs.files import write_bytes
-from airtouch.report.figures import error_distribution, flight
-from airtouch.report.map_figure import draw_edge_map
+from airtouch.report import evaluation_figures, map_figure
+from airtouch.report.style import image
 
 COLOURS = 96  #: of a picture's palette, so that it is a third of its size
 #: names of Chromium's programs
@@ -70,7 +70,7 @@ def virtual_flight() -> bytes:
     """PNG of one flight of the mission sweep: signals, probability, edges, down range."""
     (log,) = at.simulate(mission.scene_of("sweep"), seed=1)
     trace = best.run(log)
-    return flight(log, trace, logs.true_edges(log), {}, "best")
+    return image(evaluation_figures.flight(log, trace, logs.true_edges(log), name="best"))
 
 
 def zig_zag_map() -> bytes:
@@ -80,7 +80,7 @@ def zig_zag_map() -> bytes:
     edges = best.run(log, model).edges
     edge_points = edge_map.edge_map(log, edges, lag_s=best.lag_s(model),
                                     sigma_s=model.metadata.get("sigma_s", edge_map.ASSUMED_SIGMA_S))
-    return draw_edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges detected")
+    return image(map_figure.edge_map(edge_points, f"zig-zag: {len(edge_points.points)} edges detected"))
 
 
 def virtual_errors(count: int = 20) -> bytes:
@@ -92,7 +92,7 @@ def virtual_errors(count: int = 20) -> bytes:
         scores[name] = [evaluate_flight(FlightFile(Path(log.source),
                                                    Condition(speed_mps=log.meta["condition"]["speed"])),
                                         log, module, model).score for log in flights]
-    return error_distribution({name: hit_curve(flight_scores) for name, flight_scores in scores.items()})
+    return image(evaluation_figures.error_distribution({name: hit_curve(own) for name, own in scores.items()}))
 
 
 def photograph(browser: str, page: Path, width: int, height: int) -> bytes:

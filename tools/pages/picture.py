@@ -23,11 +23,11 @@ from airtouch.detector.evaluation.data import dataset
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import reliability_of
 from airtouch.errors import AirTouchError, in_one_line
-from airtouch.logs.files import make_folder, write_bytes
+from airtouch.logs.files import make_folder
 from airtouch.logs.flight_log import FlightLog
 from airtouch.reference.motion_channels import NAMES
-from airtouch.report.figures import reliability
-from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
+from airtouch.report.evaluation_figures import reliability
+from airtouch.report.style import BLUE, GREEN, GREY, RED, panes, style, write_image
 
 CHANNELS = ("motor mean", "gyro x", "ax")  #: that are drawn
 OFFSET = 5  #: nominal amplitudes between two channels
@@ -51,21 +51,21 @@ def main() -> None:
         raise AirTouchError(f"{options.models if path is None else options.json} is not there: airtouch crossval "
                             f"--out {options.models} --json {options.json}")
     make_folder(options.out)
-    write_bytes(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
+    write_image(draw(logs.read(file.path), best.load(path), options.flight), options.out / "flight.png", force=True)
     scores = [FlightScore.from_dict(s) for s in json.loads(options.json.read_text())["per_flight"]]
-    write_bytes(reliability({"best": reliability_of(scores)}), options.out / "reliability.png", force=True)
+    write_image(reliability({"best": reliability_of(scores)}), options.out / "reliability.png", force=True)
     print(f"written: flight.png and reliability.png in {options.out}")
 
 
-def draw(log: FlightLog, model: BestModel, name: str) -> bytes:
-    """PNG: what the drone measures, P(over a platform) with edges, and the down range that it never saw."""
+def draw(log: FlightLog, model: BestModel, name: str) -> Figure:
+    """What the drone measures, P(over a platform) with edges, and the down range that it never saw."""
     trace, truth = best.run(log, model), logs.true_edges(log)
     x = channels_of(log)[0]
     t = np.arange(len(log)) * 0.01
     first, last = t[truth[0].sample] - MARGIN_S[0], t[truth[-1].sample] + MARGIN_S[1]
     with style():
-        figure = Figure(figsize=(8.0, 4.6), layout="constrained")
-        axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.3, 1, 0.7))
+        figure, grid = panes((8.0, 4.6), 3, sharex=True, height_ratios=(1.3, 1, 0.7))
+        axes = grid[:, 0]
         for i, channel in enumerate(CHANNELS):
             axes[0].plot(t, x[:, NAMES.index(channel)] + OFFSET * (len(CHANNELS) - 1 - i), lw=0.7, color=GREY)
         axes[0].set_yticks([OFFSET * (len(CHANNELS) - 1 - i) for i in range(len(CHANNELS))], CHANNELS)
@@ -84,7 +84,7 @@ def draw(log: FlightLog, model: BestModel, name: str) -> bytes:
         for ax in axes:
             for crossed in truth:
                 ax.axvline(crossed.sample * 0.01, color=GREEN, ls="--", lw=1)
-        return png(figure)
+    return figure
 
 
 if __name__ == "__main__":

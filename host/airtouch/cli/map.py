@@ -62,10 +62,12 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     content = edge_map.geojson(plane.points, plane.platforms, {
         "flight": flight.name, "detector": "truth" if truth else detector, "position": plane.position,
         "lag_s": plane.lag_s, "sigma_s": plane.sigma_s, "edges_without_position": plane.without_position})
-    from airtouch.report.map_figure import draw_edge_map
+    from airtouch.report import map_figure
+    from airtouch.report.style import write_image
 
     write_bytes((json.dumps(content, allow_nan=False) + "\n").encode(), out, force)
-    write_bytes(draw_edge_map(plane, f"{flight.name}: {len(plane.points)} edges ({plane.position})"), picture, force)
+    title = f"{flight.name}: {len(plane.points)} edges ({plane.position})"
+    write_image(map_figure.edge_map(plane, title), picture, force)
     for point in plane.points:
         click.echo(f"{point.kind:5} at {point.time_s:6.2f} s: x {point.x_m:+.3f} m, y {point.y_m:+.3f} m, "
                    f"1-sigma {point.sigma_m:.3f} m")

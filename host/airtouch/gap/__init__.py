@@ -1,7 +1,8 @@
 """Where the gap between simulation and reality lies, which effect causes it, how far it shrinks.
 
-`airtouch.gap.diagnose(flights, vehicle, baseline)` and `airtouch.gap.measure(...)` are those of `airtouch.api`, which
-take files, logs or tables. Those of the modules `diagnosis` and `measurement` take logs alone.
+`airtouch.gap.diagnose(flights, vehicle, baseline)`, `airtouch.gap.measure(...)` and `airtouch.gap.plots(result)` are
+those of `airtouch.api`, which take files, logs or tables. Those of the modules `diagnosis` and `measurement` take logs
+alone.
 
 One folder a step, the first step last; each imports only those below it. The decisions, file by file:
 host/docs/architecture.md.
@@ -32,13 +33,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from airtouch.api import diagnose, measure
+    from airtouch.api import diagnose, measure, plots
 
-__all__ = ["diagnose", "measure"]
+__all__ = ["diagnose", "measure", "plots"]
 
 if not TYPE_CHECKING:  # so that a type checker tells a name that is not there
     def __getattr__(name: str) -> Any:
-        """The two functions, whose modules are imported at their first use."""
+        """The functions, whose modules are imported at their first use."""
         if name in __all__:
             return getattr(importlib.import_module("airtouch.api"), name)
         raise AttributeError(f"module 'airtouch.gap' has no attribute {name!r}")

@@ -43,7 +43,8 @@ class Measurement:
     calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
     flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
     flights were not used; study: what the map holds them against; nominal: the baseline flights, whose floor the
-    pictures show; uses_gyro: whether a gyro that the flights have is used, as it is where the baseline has one.
+    pictures show; pictures: of `pictures_of_measurement`, where they were asked for; uses_gyro: whether a gyro that the
+    flights have is used, as it is where the baseline has one.
     """
 
     vehicle: str
@@ -60,6 +61,7 @@ class Measurement:
     left_out: tuple[str, ...] = ()
     study: Study | None = field(default=None, compare=False, repr=False)
     nominal: tuple[Flight, ...] = field(default=(), compare=False, repr=False)
+    pictures: Pictures | None = field(default=None, compare=False, repr=False)
     uses_gyro: bool = field(default=True, compare=False, repr=False)
 
     @property

@@ -1,6 +1,5 @@
 """Plots that several figures share, each drawn on a matplotlib axes."""
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -8,8 +7,8 @@ import numpy as np
 
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import hit_curve
-from airtouch.report.figures import COLOURS
-from airtouch.report.style import GREY, STYLE
+from airtouch.report.evaluation_figures import COLOURS
+from airtouch.report.style import GREY, image, style
 
 PAPER = "#444444"  #: colour of the paper's figures in every plot
 WIDTH_IN, HEIGHT_IN = 6.4, 3.8
@@ -17,19 +16,12 @@ WIDTH_IN, HEIGHT_IN = 6.4, 3.8
 
 def render(draw: Any) -> tuple[bytes, bytes]:
     """(PNG, SVG) of a figure that `draw` fills."""
-    import matplotlib
     from matplotlib.figure import Figure
 
-    look: Any = STYLE | {"svg.hashsalt": "airtouch"}
-    with matplotlib.rc_context(look):
+    with style({"figure.dpi": 130}):
         canvas = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         draw(canvas)
-        files = []
-        for form in ("png", "svg"):
-            buffer = io.BytesIO()
-            canvas.savefig(buffer, format=form, dpi=130, metadata={"Date": None} if form == "svg" else None)
-            files.append(buffer.getvalue())
-    return files[0], files[1]
+        return image(canvas), image(canvas, "svg")
 
 
 def colour(name: str) -> str:

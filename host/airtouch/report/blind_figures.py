@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from airtouch.gap.sealed.score import GOALS, SEVERITIES
-from airtouch.report.style import BLUE, GREY, png, style
+from airtouch.report.style import BLUE, GREY, panes, style
 
 Rows = list[tuple[str, str, str, str]]  #: of a table of four columns, as text
 APART = "where the data tell the effects apart"
@@ -87,14 +87,13 @@ def effect_rows(score: Mapping[str, Any]) -> Rows:
     return out
 
 
-def picture(score: Mapping[str, Any]) -> bytes:
-    """PNG of the confusion matrix beside the reliability diagram."""
+def confusion_and_reliability(score: Mapping[str, Any]) -> Figure:
+    """The confusion matrix beside the reliability diagram."""
     with style():
-        figure = Figure(figsize=(12.0, 7.6), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=[1.7, 1.0])
+        figure, ((left, right),) = panes((12.0, 7.6), columns=2, width_ratios=[1.7, 1.0])
         _draw_confusion(left, score["confusion"])
         _draw_reliability(right, score["reliability"])
-        return png(figure)
+    return figure
 
 
 def _draw_confusion(axes: Axes, table: Mapping[str, Mapping[str, int]]) -> None:

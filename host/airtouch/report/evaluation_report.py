@@ -10,7 +10,7 @@ from airtouch.detector.evaluation.score_report import ScoreReport
 from airtouch.logs.files import write_bytes
 from airtouch.parameters import SAMPLE_RATE_HZ
 from airtouch.report.columns import COLUMNS, cell
-from airtouch.report.html_page import data_url, rendered
+from airtouch.report.html_page import embedded, rendered
 
 
 def write_report(
@@ -28,7 +28,7 @@ def write_report(
     parameters, command: printed at the end of the page. left_out: (file, reason) of flights that were not scored.
     Raises AirTouchError for a file that exists, without `force`.
     """
-    from airtouch.report import figures
+    from airtouch.report import evaluation_figures as figures
 
     first = next(iter(scored.summaries))
     fewest_missed_first = sorted(scored.summaries.items(), key=lambda row: row[1]["missed_count"])
@@ -36,10 +36,10 @@ def write_report(
         "evaluation.html",
         title=title, answers=[answer(*row) for row in fewest_missed_first], summaries=scored.summaries,
         columns=COLUMNS, cell=cell, breakdowns=scored.breakdowns,
-        errors=data_url(figures.error_distribution(scored.hits)),
-        reliability=data_url(figures.reliability(scored.reliability)),
+        errors=embedded(figures.error_distribution(scored.hits)),
+        reliability=embedded(figures.reliability(scored.reliability)),
         flights=[{"name": f.score.file, "text": in_words(f.score),
-                  "image": data_url(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
+                  "image": embedded(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)
 

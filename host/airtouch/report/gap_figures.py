@@ -1,4 +1,4 @@
-"""Plots of the gap without and with the named effects in the model, each as the bytes of a PNG."""
+"""Plots of the gap without and with the named effects in the model, each as a matplotlib figure."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,18 +11,17 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
-from airtouch.report.style import BLUE, GREEN, GREY, RED, TITLE_AT, Room, limit, panes, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, RED, TITLE_AT, Room, limit, panes, style
 
 BEFORE, AFTER, FLOOR = RED, GREEN, GREY  #: colours of the gap without and with the named effects, and of its floor
-#: changes of `style.STYLE` for plots that are read on a phone
-PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9}
+#: changes of `style.STYLE` for plots that are read on a phone; the dots per inch are chosen, sharp there
+PHONE = {"font.size": 10, "axes.titlesize": 10, "legend.frameon": False, "legend.fontsize": 9, "figure.dpi": 170}
 #: look of the gap without the named effects: broad and pale, so that it shows behind the gap with them
 BEHIND: dict[str, Any] = {"color": BEFORE, "lw": 2.6, "alpha": 0.5}
 FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of dense curves
 ABOVE = 2.5  #: zorder of the measured curve and of the floor, above that of lines, 2: a dense curve would hide them
 #: look of the seconds in which an effect acts: a bar along the upper end of a pane
 ACTS: dict[str, Any] = {"facecolor": AFTER, "ymin": 0.96, "lw": 0.0, "zorder": ABOVE}
-PHONE_DPI = 170  #: dots per inch of such plots; chosen, sharp on a phone
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
@@ -34,8 +33,8 @@ SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PHASE_COLOURS = {"take-off": "#dbeafe", "over platform": "#fef3c7", "landing": "#dbeafe"}
 
 
-def signals(signal: Signal) -> bytes:
-    """PNG of one channel of one flight in a band: measured, modelled, their difference, the height."""
+def signals(signal: Signal) -> Figure:
+    """One channel of one flight in a band: measured, modelled, their difference, the height."""
     gaps = [gap for gap in (signal.before, signal.after) if gap is not None]
     rows = 1 + (signal.measured is not None) + (signal.height_m is not None)
     with style(PHONE):
@@ -67,11 +66,11 @@ def signals(signal: Signal) -> bytes:
                 ax.axvspan(begin, end, **ACTS)
             ax.margins(x=0)
             ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, columnspacing=1.0, handlelength=1.5)
-        return png(figure, PHONE_DPI)
+    return figure
 
 
-def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
-    """PNG of the gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
+def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> Figure:
+    """The gap's spectra, one pane a channel: before, floor, and after if there is an effect."""
     rows = len(shown)
     with style(PHONE):
         figure, axes = _column(rows, 1.35, TITLES)
@@ -88,11 +87,11 @@ def spectra(frequency_hz: np.ndarray, shown: Sequence[Spectrum]) -> bytes:
             ax.grid(alpha=0.2)
         _legend(figure, axes)
         _frequency_axis(axes, (0.5, 1, 2, 5, 10, 20, 50))
-        return png(figure, PHONE_DPI)
+    return figure
 
 
-def commands(curves: MeanSpectra) -> bytes:
-    """PNG of the motor commands' spectra beside those of nominal flights, one pane an axis."""
+def commands(curves: MeanSpectra) -> Figure:
+    """The motor commands' spectra beside those of nominal flights, one pane an axis."""
     f = curves.frequency_hz
     with style(PHONE):
         figure, axes = _column(len(curves.flown), 1.2, TITLES)
@@ -105,13 +104,13 @@ def commands(curves: MeanSpectra) -> bytes:
             ax.grid(alpha=0.2)
         _legend(figure, axes)
         _frequency_axis(axes, (2, 5, 10, 20, 40))
-        return png(figure, PHONE_DPI)
+    return figure
 
 
 def _column(rows: int, pane_in: float, room: Room) -> tuple[Figure, np.ndarray]:
     """A figure, and its panes (rows,) one below another, each pane_in inch high."""
     height_in = room.below_in + rows * (pane_in + room.above_in) + room.top_in
-    figure, axes = panes((WIDTH_IN, height_in), rows, 1, room)
+    figure, axes = panes((WIDTH_IN, height_in), rows, room=room)
     return figure, axes[:, 0]
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,21 +28,24 @@ from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
 from airtouch.gap.where.cell_words import remaining_in_words
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.segments import KINDS
 from airtouch.report import gap_tables
-from airtouch.report.html_page import data_url, rendered
+from airtouch.report.html_page import embedded, rendered
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
 AXIS_LIMITS = "An axis holds the middle 99 % of each curve."  #: in the plot of a signal, by `style.limit`
+PLOTS = ("signal", "spectra", "commands")  #: names of the page's plots, in its order
 MOST_NAMED = 5  #: flights that the page names; chosen
 
 
-def write_measurement(path: Path, measurement: Measurement, pictures: Pictures | None = None, *, command: str,
-                      force: bool = False) -> None:
+def write_measurement(path: Path, measurement: Measurement, *, command: str, force: bool = False) -> None:
     """Write the page of `airtouch gap measure`: map, largest cells, signals and spectra.
 
     Raises AirTouchError for a file that exists, without `force`.
@@ -50,11 +53,11 @@ def write_measurement(path: Path, measurement: Measurement, pictures: Pictures |
     page = _page(
         title="Gap between flights and simulator", headline=measurement.headline,
         answers=measurement.sentences,
-        cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where, pictures=pictures,
-        calibration=gap_tables.parameter_rows(measurement.calibration),
+        cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where,
+        pictures=measurement.pictures, calibration=gap_tables.parameter_rows(measurement.calibration),
         lists=[("Rotor speeds in the air", [r.in_words() for r in measurement.rotors]),
-               ("What these logs cannot say", measurement.cannot), ("Notes", _notes(measurement.notes, pictures)),
-               ("Left out", measurement.left_out)],
+               ("What these logs cannot say", measurement.cannot),
+               ("Notes", _notes(measurement.notes, measurement.pictures)), ("Left out", measurement.left_out)],
         flights=_flights(measurement.flights, measurement.vehicle, measurement.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -113,11 +116,37 @@ def _notes(notes: Sequence[str], pictures: Pictures | None) -> list[str]:
 
 
 class Plot(NamedTuple):
-    """A plot of the page: its title, the text below it, and what draws it as a PNG."""
+    """A plot of the page: its name, one of PLOTS; its title, the text below it, and what draws it."""
 
+    name: str
     title: str
     text: str
-    draw: Callable[[], bytes]
+    draw: Callable[[], "Figure"]
+
+
+def figures(pictures: Pictures | None) -> dict[str, "Figure"]:
+    """The plots of the page by their names, as far as there are any. Needs matplotlib."""
+    return {plot.name: plot.draw() for plot in _plots(pictures)}
+
+
+def plot_files(folder: Path) -> list[Path]:
+    """The files that `write_plots` may write to a folder."""
+    return [folder / f"{name}.{form}" for name in PLOTS for form in ("svg", "pdf")]
+
+
+def write_plots(folder: Path, pictures: Pictures | None, force: bool = False) -> list[Path]:
+    """Write the plots of the page to a folder, each as SVG and PDF, and return the files; needs matplotlib.
+
+    Raises AirTouchError for a file that exists, without `force`.
+    """
+    from airtouch.report.style import write_image
+
+    make_folder(folder)
+    drawn = figures(pictures)
+    files = [file for file in plot_files(folder) if file.stem in drawn]
+    for file in files:
+        write_image(drawn[file.stem], file, force)
+    return files
 
 
 def _images(pictures: Pictures | None) -> list[dict[str, str]]:
@@ -128,16 +157,17 @@ def _images(pictures: Pictures | None) -> list[dict[str, str]]:
     if pictures is None or lacking("plots"):
         return []
     plots = _plots(pictures)
-    drawn = map_on_two_cores(lambda plot: plot.draw(), plots)
-    return [{"title": plot.title, "data": data_url(png), "text": plot.text}
-            for plot, png in zip(plots, drawn, strict=True)]
+    drawn = map_on_two_cores(lambda plot: embedded(plot.draw()), plots)
+    return [{"title": plot.title, "data": data, "text": plot.text} for plot, data in zip(plots, drawn, strict=True)]
 
 
-def _plots(pictures: Pictures) -> list[Plot]:
+def _plots(pictures: Pictures | None) -> list[Plot]:
     """Plots of the headline's signal, of the gap's spectra and of the commands' spectra, as far as there are any."""
     from airtouch.report import gap_figures
 
-    plots = []
+    plots: list[Plot] = []
+    if pictures is None:
+        return plots
     if pictures.signal is not None:
         signal = pictures.signal
         phases = {KINDS[kind] for kind in np.unique(signal.phase)}
@@ -148,7 +178,7 @@ def _plots(pictures: Pictures) -> list[Plot]:
                    *(["Green bar: the effect acts."] if signal.acts_s else []),
                    *_curves_of_a_random_effect(pictures), AXIS_LIMITS]
         low, high = signal.band_hz
-        plots.append(Plot(f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
+        plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if pictures.spectra:
         text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
@@ -157,10 +187,10 @@ def _plots(pictures: Pictures) -> list[Plot]:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
                      "counts as gap.")
-        plots.append(Plot("Spectra of the gap in the air", text,
+        plots.append(Plot("spectra", "Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
     if pictures.commands is not None:
-        plots.append(Plot("Spectra of the motor commands",
+        plots.append(Plot("commands", "Spectra of the motor commands",
                           "Delays, gains and noise in the loop show here, as a shape that differs. They are looked for "
                           "in the loops of thrust, roll and pitch alone, so the yaw command is not drawn.",
                           partial(gap_figures.commands, pictures.commands)))

@@ -2,9 +2,12 @@
 
 import base64
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def rendered(template: str, /, *, folder: str = "airtouch.report", **context: Any) -> str:
@@ -15,6 +18,13 @@ def rendered(template: str, /, *, folder: str = "airtouch.report", **context: An
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, undefined=jinja2.StrictUndefined)
     source = (resources.files(folder) / template).read_text("utf-8")
     return environment.from_string(source).render(context)
+
+
+def embedded(figure: "Figure") -> str:
+    """The figure as a page holds it: a PNG as a data URL."""
+    from airtouch.report.style import image
+
+    return data_url(image(figure))
 
 
 def data_url(png: bytes) -> str:

@@ -1,4 +1,4 @@
-"""The picture of an edge map."""
+"""The plot of an edge map."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,24 +8,17 @@ from shapely.geometry import LineString, Point
 from shapely.plotting import patch_from_polygon
 
 from airtouch.detector.evaluation.edge_map import EdgeMap, Platform
-from airtouch.report.style import BLUE, GREEN, GREY, RED, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, RED, panes, style
 
 STRIP_M = 0.3  #: m, drawn width of a platform that was crossed once; its true width is unknown
 COLOURS = {"entry": BLUE, "exit": RED, "edge": GREEN}
 
 
-def draw_edge_map(edges: EdgeMap, title: str) -> bytes:
-    """PNG of the track, the edges with 2-sigma bars along the track, platforms and a scale bar."""
-    with style():
-        return png(figure_of(edges, title))
-
-
-def figure_of(edges: EdgeMap, title: str) -> Figure:
-    """The map as a matplotlib figure."""
+def edge_map(edges: EdgeMap, title: str) -> Figure:
+    """The track, the edges with 2-sigma bars along the track, platforms and a scale bar, as a matplotlib figure."""
     xy = edges.xy
     with style():
-        figure = Figure(figsize=(7.2, 5.0), layout="constrained")
-        ax = figure.subplots()
+        figure, ((ax,),) = panes((7.2, 5.0))
         ax.grid(color="#e5e7eb", lw=0.6, zorder=0)
         ax.plot(*xy.T, color=GREY, lw=0.9, label="track")
         _ends(ax, xy)
@@ -39,7 +32,7 @@ def figure_of(edges: EdgeMap, title: str) -> Figure:
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
         figure.draw_without_rendering()  # equal axes change the limits when they are drawn
         _scale_bar(ax)
-        return figure
+    return figure
 
 
 def _draw_platform(ax: Axes, platform: Platform) -> None:

@@ -1,17 +1,28 @@
-"""The look of every plot: colours, fonts, limits of an axis, and the PNG."""
+"""The look of every plot: colours, fonts, panes, limits of an axis; and the image file that a figure becomes.
+
+A plot is a function that returns a matplotlib `Figure`, drawn without pyplot: it needs no display, and none stays open.
+"""
 
 import io
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from typing import Any, Literal, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from airtouch.logs.files import write_bytes
+
 GREEN, BLUE, RED, GREY = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
-STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9}
+STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9,
+                         "figure.dpi": 120}
+#: image formats, and what each stores of the time at which it was made: nothing, so that equal figures are equal files
+FORMATS: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+#: of a file: names in an SVG that do not change, and fonts in a PDF that journals take (TrueType)
+FILE_STYLE: Any = {"svg.hashsalt": "airtouch", "pdf.fonttype": 42}
 
 TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
 
@@ -26,21 +37,30 @@ class Room(NamedTuple):
     top_in: float = 0.0
 
 
-def panes(size_in: tuple[float, float], rows: int, columns: int, room: Room,
-          sharey: Literal["none", "row"] = "none") -> tuple[Figure, np.ndarray]:
-    """A figure of a fixed layout, and its panes (rows, columns): to find a layout, matplotlib draws twice.
+def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: Room | None = None,
+          **subplots: Any) -> tuple[Figure, np.ndarray]:
+    """A figure, and its panes (rows, columns).
 
-    size_in: width and height, inch; room: below the lowest panes alone, as all share the x axis; sharey: whether the
-    panes of a row have one y axis.
+    size_in: width and height, inch. room: fixes the layout, and all panes share the x axis, so that there is room below
+    the lowest alone; without, matplotlib finds the layout, for which it draws twice. subplots: as in `Figure.subplots`.
     """
+    figure = Figure(figsize=size_in, layout=None if room else "constrained")
+    if room:
+        subplots = {"sharex": True, "gridspec_kw": _grid(size_in, rows, columns, room), **subplots}
+    axes = figure.subplots(rows, columns, squeeze=False, **subplots)
+    for ax in axes.flat:  # ticks are made when the figure is saved, by then without the style
+        ax.tick_params(which="both", labelsize=matplotlib.rcParams["font.size"])
+    return figure, axes
+
+
+def _grid(size_in: tuple[float, float], rows: int, columns: int, room: Room) -> dict[str, float]:
+    """Ends of the panes, fractions of the figure, and spaces between them, fractions of a pane: `gridspec_kw`."""
     width_in, height_in = size_in
     pane_width_in = (width_in - room.right_in) / columns - room.left_in
     pane_height_in = (height_in - room.below_in - room.top_in) / rows - room.above_in
-    grid = {"left": room.left_in / width_in, "right": 1.0 - room.right_in / width_in,
+    return {"left": room.left_in / width_in, "right": 1.0 - room.right_in / width_in,
             "bottom": room.below_in / height_in, "top": 1.0 - (room.above_in + room.top_in) / height_in,
             "wspace": room.left_in / pane_width_in, "hspace": room.above_in / pane_height_in}
-    figure = Figure(figsize=size_in)
-    return figure, figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False, gridspec_kw=grid)
 
 
 def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:
@@ -49,11 +69,21 @@ def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[No
     return matplotlib.rc_context(look)
 
 
-def png(figure: Figure, dots_per_inch: float = 120) -> bytes:
-    """The figure as a PNG."""
+def image(figure: Figure, form: str = "png") -> bytes:
+    """The figure as the bytes of an image file, in one of FORMATS."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dots_per_inch)
+    with matplotlib.rc_context(FILE_STYLE):
+        figure.savefig(buffer, format=form, metadata=FORMATS[form])
     return buffer.getvalue()
+
+
+def write_image(figure: Figure, path: Path, force: bool = False) -> None:
+    """Write the figure as SVG, PDF or PNG, by the ending of the name; as PNG for any other ending.
+
+    Raises AirTouchError as `logs.files.write_bytes`.
+    """
+    ending = path.suffix.lower().removeprefix(".")
+    write_bytes(image(figure, ending if ending in FORMATS else "png"), path, force)
 
 
 def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e-9) -> None:

@@ -1,10 +1,11 @@
-"""Plots of a twin beside the recorded flights, each as the bytes of a PNG."""
+"""Plots of a twin beside the recorded flights, each as a matplotlib figure."""
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from airtouch.parameters import SAMPLE_RATE_HZ
-from airtouch.report.style import BLUE, GREEN, GREY, TITLE_AT, Room, panes, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, TITLE_AT, Room, panes, style
 from airtouch.twin.comparison.curves import AFTER, BEFORE, AroundEdges, Signals
 from airtouch.twin.recorded import channels as ch
 from airtouch.twin.recorded.channels import NAMES, UNITS
@@ -16,8 +17,8 @@ ROOM = Room(left_in=0.6, below_in=0.5, above_in=0.3)
 SOURCES = (("recorded", GREEN), ("simulated", BLUE))
 
 
-def overlaid(pair: tuple[Signals, Signals]) -> bytes:
-    """PNG of all twelve channels of a recorded flight and its twin, from 2 s before the entry to 2 s after the exit."""
+def overlaid(pair: tuple[Signals, Signals]) -> Figure:
+    """All twelve channels of a recorded flight and its twin, from 2 s before the entry to 2 s after the exit."""
     with style():
         figure, axes = panes((WIDTH_IN, 10.5), 6, 2, ROOM)
         for k, axis in enumerate(axes.T.ravel()):
@@ -28,11 +29,11 @@ def overlaid(pair: tuple[Signals, Signals]) -> bytes:
         axes[0, 0].legend(frameon=False)
         for axis in axes[-1]:
             axis.set_xlabel("s after the entry")
-        return png(figure)
+    return figure
 
 
-def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
-    """PNG of the twelve channels around the edges of one height class, entry beside exit, as quartiles over flights.
+def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> Figure:
+    """The twelve channels around the edges of one height class, entry beside exit, as quartiles over flights.
 
     kinds: by kind of edge the recorded and the simulated flights.
     """
@@ -48,11 +49,11 @@ def edges(kinds: dict[str, tuple[AroundEdges, AroundEdges]]) -> bytes:
         axes[0, 0].legend(frameon=False)
         for axis in axes[-1]:
             axis.set_xlabel("s after the edge")
-        return png(figure)
+    return figure
 
 
-def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
-    """PNG of band powers in free air of eleven channels, as quartiles over flights.
+def spectra(pair: tuple[np.ndarray, np.ndarray]) -> Figure:
+    """Band powers in free air of eleven channels, as quartiles over flights.
 
     pair: quartiles of the recorded and of the simulated flights, (3, 11, bands) each, dB.
     """
@@ -70,7 +71,7 @@ def spectra(pair: tuple[np.ndarray, np.ndarray]) -> bytes:
             axis.set_xticks(place, [f"{a:g}-{b:g}" for a, b in BANDS_HZ], rotation=90)
             axis.tick_params(labelbottom=True)  # also of the pane above the empty one
             axis.set_xlabel("Hz")
-        return png(figure)
+    return figure
 
 
 def _quartiles(axis: Axes, x: np.ndarray, quartiles: np.ndarray, colour: str, label: str) -> None:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from airtouch import __version__
 from airtouch.logs.files import write_bytes
 from airtouch.report import twin_figures
-from airtouch.report.html_page import data_url, rendered
+from airtouch.report.html_page import embedded, rendered
 from airtouch.twin.comparison.compare import Comparison
 from airtouch.twin.comparison.curves import Curves
 from airtouch.twin.comparison.words import answer, gap_row
@@ -39,7 +39,7 @@ def write_report(path: Path, twin: FlownTwin, *, command: str, force: bool = Fal
         gaps=[gap_row(g) for g in comparison.gaps[:MOST_GAPS]],
         levers=[(lever.name, f"{value:.4g}", f"{lever.start:.4g}", lever.unit)
                 for lever, value in zip(fit.levers, fit.values, strict=True)],
-        images=[(title, text, data_url(data)) for title, text, data in images],
+        images=[(title, text, embedded(figure)) for title, text, figure in images],
         flights=len(recorded.courses), simulated=len(comparison.flights), lost=comparison.diverged,
         left_out=recorded.left_out,
         speeds=sorted({c.speed_from for c in recorded.courses}), command=command, version=__version__)

@@ -52,7 +52,7 @@ def blind_make(out: Path, flights: int, seed: int, key: Path | None, force: bool
 @click.option("--json", "json_path", type=click.Path(path_type=Path, dir_okay=False),
               help="Write every figure.")
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False),
-              help="Write the confusion matrix and the reliability to this PNG.")
+              help="Write the confusion matrix and the reliability to this PNG, SVG or PDF.")
 @click.option("--force", is_flag=True, help="Replace the files.")
 def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path | None, plot: Path | None,
                 force: bool) -> None:
@@ -107,8 +107,8 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     """Print the score of a blind check, and write it to files."""
     from rich.table import Table
 
-    from airtouch.logs.files import write_bytes
     from airtouch.report import blind_figures
+    from airtouch.report.style import write_image
 
     for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.score_rows(figures)),
                         (("kind", "effect in top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
@@ -119,5 +119,5 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     if json_path:
         output.write_json(json_path, figures, force)
     if plot:
-        write_bytes(blind_figures.picture(figures), plot, force)
+        write_image(blind_figures.confusion_and_reliability(figures), plot, force)
     written(json_path, plot)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_all_free, inputs_and_outputs, runner, written
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_outputs, inputs_and_outputs, runner, written
 from airtouch.cli.gap.progress import LateBar
 from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
@@ -28,8 +28,8 @@ from airtouch.errors import AirTouchError
                    "--baseline.")
 @click.option("--each", is_flag=True, help="Diagnose each flight alone.")
 def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
-                     report: Path | None, json_path: Path | None, dask: str | None, force: bool,
-                     without: tuple[str, ...], effect_files: tuple[str, ...], partner: tuple[str, ...],
+                     report: Path | None, plots: Path | None, json_path: Path | None, dask: str | None,
+                     force: bool, without: tuple[str, ...], effect_files: tuple[str, ...], partner: tuple[str, ...],
                      each: bool) -> None:
     """Find the unmodelled effect that REAL flights have in common, and the part of the gap that it explains.
 
@@ -38,15 +38,16 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     wakes. Prints where the gap lies, which effect causes it and how far it closes; `none` and `unknown` are answers
     too, with exit code 0.
     """
-    check_all_free((report, json_path), force)
-    if each and report:
-        raise AirTouchError("--report shows one diagnosis; leave --each out")
+    check_outputs(report, plots, json_path, force)
+    if each and (report or plots):
+        raise AirTouchError("--report and --plots show one diagnosis; leave --each out")
     if dask and not each:
         raise AirTouchError("--dask spreads flights that are diagnosed one by one; add --each")
     if each and partner:
         raise AirTouchError("--partner is of one flight; leave --each out")
     if partner and not baseline:
         raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
+    drawn: list[Path] = []
     with LateBar() as bar:
         from airtouch.cli.gap import files, next_commands, show
         from airtouch.simulation import effects
@@ -67,8 +68,8 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         if not each:
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
-            diagnosis = next_commands.with_names(case(logs, progress=bar, pictures=bool(report)), vehicle_named, real,
-                                                 baseline)
+            diagnosis = next_commands.with_names(case(logs, progress=bar, pictures=bool(report or plots)),
+                                                 vehicle_named, real, baseline)
             if json_path:
                 output.write_json(json_path, diagnosis.plain(), force)
             if report:
@@ -76,6 +77,10 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
 
                 bar("report")
                 gap_report.write_diagnosis(report, diagnosis, command=typed(NAMES_SHOWN), force=force)
+            if plots:
+                from airtouch.report import gap_report
+
+                drawn = gap_report.write_plots(plots, diagnosis.pictures, force)
     diagnosed = 1
     if each:
         diagnosed = _each(flights, case, lambda d: next_commands.with_names(d, vehicle_named, d.flights, baseline),
@@ -85,7 +90,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
     show.left_out([*flights.failed.values(), *nominal.failed.values(), *partners.failed.values()])
     if not diagnosed:
         raise AirTouchError(f"none of {len(flights)} flights can be diagnosed; the reasons are above")
-    written(json_path, report)
+    written(json_path, report, *drawn)
 
 
 def _case(vehicle: Any, nominal: list, without: tuple[str, ...], partner: list) -> Callable:

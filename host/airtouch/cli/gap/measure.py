@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_all_free, inputs_and_outputs, written
+from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_outputs, inputs_and_outputs, written
 from airtouch.cli.gap.progress import LateBar
 from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
@@ -17,12 +17,13 @@ from airtouch.cli.shared.typed import typed
     "airtouch gap measure real/*.csv --baseline nominal --vehicle mine.toml"))
 @inputs_and_outputs
 def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: tuple[str, ...],
-                    report: Path | None, json_path: Path | None, dask: str | None, force: bool) -> None:
+                    report: Path | None, plots: Path | None, json_path: Path | None, dask: str | None,
+                    force: bool) -> None:
     """Map the gap between REAL flights and the model, by channel, band, phase and regime.
 
     REAL and --baseline are log files, folders or patterns; give REAL first.
     """
-    check_all_free((report, json_path), force)
+    check_outputs(report, plots, json_path, force)
     with LateBar() as bar:
         import airtouch.gap.measurement as measure
         from airtouch.cli.gap import files, show
@@ -37,11 +38,15 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     measurement = replace(measurement, left_out=(*failed, *measurement.left_out))
     if json_path:
         output.write_json(json_path, measurement.plain(), force)
-    if report:
+    drawn: list[Path] = []
+    if report or plots:
         from airtouch.report import gap_report
 
-        pictures = measure.pictures_of_measurement(measurement, flights, vehicle)
-        gap_report.write_measurement(report, measurement, pictures, force=force, command=typed(NAMES_SHOWN))
+        measurement = replace(measurement, pictures=measure.pictures_of_measurement(measurement, flights, vehicle))
+        if report:
+            gap_report.write_measurement(report, measurement, force=force, command=typed(NAMES_SHOWN))
+        if plots:
+            drawn = gap_report.write_plots(plots, measurement.pictures, force)
     show.measurement(output.console(), measurement)
     show.left_out(measurement.left_out)
-    written(json_path, report)
+    written(json_path, report, *drawn)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from airtouch.extras import need
 from airtouch.logs import files
 
 NAMES_SHOWN = 4  #: files in a row in a report's command, of more the rest is counted; no source: fits a line
@@ -41,6 +42,8 @@ def inputs_and_outputs(function: Callable) -> Callable:
         click.option("--force", is_flag=True, help="Replace the files."),
         click.option("--dask", metavar="SCHEDULER", help="Address of a dask.distributed scheduler."),
         click.option("--json", "json_path", type=path, help="Write every figure to this file."),
+        click.option("--plots", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+                     help="Write the report's plots to this folder, each as SVG and PDF."),
         click.option("--report", type=path, help="Write a report to this HTML file."),
         click.option("--baseline", multiple=True, metavar="NOMINAL...",
                      help="Flights without any unmodelled effect, up to the next option."),
@@ -56,6 +59,16 @@ def check_all_free(paths: Iterable[Path | None], force: bool) -> None:
     """Refuse, before the work, to replace a file without --force."""
     for path in paths:
         files.check_free(path, force)
+
+
+def check_outputs(report: Path | None, plots: Path | None, json_path: Path | None, force: bool) -> None:
+    """Refuse, before the work, to replace what `inputs_and_outputs` names without --force, and to plot in vain."""
+    if plots:
+        need("plots", "--plots")
+        from airtouch.report.gap_report import plot_files
+
+        click.get_current_context().with_resource(files.no_empty_folders(plots))
+    check_all_free((report, json_path, *(plot_files(plots) if plots else ())), force)
 
 
 def written(*paths: Path | None) -> None:

@@ -1,4 +1,4 @@
-"""Plots of flights and scores, each as the bytes of a PNG."""
+"""Plots of flights and scores, each as a matplotlib figure."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from airtouch.detector.trace import Trace
 from airtouch.logs import Edge, airborne
 from airtouch.logs.flight_log import FlightLog
 from airtouch.parameters import SAMPLE_PERIOD_S
-from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, png, style
+from airtouch.report.style import BLUE, GREEN, GREY, RED, limit, panes, style
 
 #: detector -> its colour in every plot
 COLOURS = {"best": BLUE, "paper": RED, "baseline": "#b26a00", "paper-stream": "#7a3e9d"}
@@ -43,39 +43,38 @@ def colour_of(name: str) -> str:
 
 
 def flight(
-    log: FlightLog, trace: Trace, edges: Sequence[Edge] | None, others: Mapping[str, Trace],
+    log: FlightLog, trace: Trace, edges: Sequence[Edge] | None = None, others: Mapping[str, Trace] | None = None,
     name: str = "detected",
-) -> bytes:
-    """PNG of one flight, from signals to edges, in panes over the same time axis.
+) -> Figure:
+    """One flight, from signals to edges, in panes over the same time axis.
 
     The panes: signals, band power, probability, detected edges, disturbance force with its FR-CFAR threshold, down
     range. Panes without a signal in the trace are left out. edges: true ones, marked in every pane. others: traces of
     other detectors, whose edges are shown below those of `trace`. name: label of `trace`.
     """
-    panes: list[Callable[[Axes, PlottedFlight], None]] = []
-    panes += [_accelerations, _rates, _motors] if "channels" in trace.signals else []
-    panes += [_band_power] if "band_power" in trace.signals else []
-    panes += [_probability, _edges]
-    panes += [_force, _cfar] if "force" in trace.signals else []
-    panes += [_range] if log.has("zrange_m") else []
+    drawn: list[Callable[[Axes, PlottedFlight], None]] = []
+    drawn += [_accelerations, _rates, _motors] if "channels" in trace.signals else []
+    drawn += [_band_power] if "band_power" in trace.signals else []
+    drawn += [_probability, _edges]
+    drawn += [_force, _cfar] if "force" in trace.signals else []
+    drawn += [_range] if log.has("zrange_m") else []
     with style():
-        figure = Figure(figsize=(7.2, 1.15 * len(panes) + 0.9), layout="constrained")
-        axes = figure.subplots(len(panes), 1, sharex=True, squeeze=False)[:, 0]
-        plotted = PlottedFlight(np.arange(len(log)) * SAMPLE_PERIOD_S, log, trace, {name: trace, **others})
-        for ax, pane in zip(axes, panes, strict=True):
-            pane(ax, plotted)
+        figure, grid = panes((7.2, 1.15 * len(drawn) + 0.9), len(drawn), sharex=True)
+        axes = grid[:, 0]
+        plotted = PlottedFlight(np.arange(len(log)) * SAMPLE_PERIOD_S, log, trace, {name: trace, **(others or {})})
+        for ax, draw in zip(axes, drawn, strict=True):
+            draw(ax, plotted)
             for edge in edges or ():
                 ax.axvline(edge.sample * SAMPLE_PERIOD_S, color=GREEN, lw=1.2, ls="--", alpha=0.8)
             ax.margins(x=0)
         axes[-1].set_xlabel("time, s" + (" (dashed green: true edges, from the down range)" if edges else ""))
-        return png(figure)
+    return figure
 
 
-def reliability(curves: Mapping[str, Reliability]) -> bytes:
-    """PNG of reliability diagrams: fraction of samples truly over a platform against the stated probability."""
+def reliability(curves: Mapping[str, Reliability]) -> Figure:
+    """Reliability diagrams: fraction of samples truly over a platform against the stated probability."""
     with style():
-        figure = Figure(figsize=(4.6, 4.2), layout="constrained")
-        ax = figure.subplots()
+        figure, ((ax,),) = panes((4.6, 4.2))
         ax.plot([0, 1], [0, 1], color=GREY, lw=1, ls="--", label="perfect")
         for name, curve in curves.items():
             if len(curve.stated):
@@ -85,14 +84,13 @@ def reliability(curves: Mapping[str, Reliability]) -> bytes:
         ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="fraction truly over",
                title="Reliability; a dot's area is its fraction of the samples")
         ax.legend(loc="upper left", frameon=False)
-        return png(figure)
+    return figure
 
 
-def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
-    """PNG of hit curves, one a detector: fraction of all true edges detected within a distance."""
+def error_distribution(curves: Mapping[str, HitCurve]) -> Figure:
+    """Hit curves, one a detector: fraction of all true edges detected within a distance."""
     with style():
-        figure = Figure(figsize=(4.6, 4.2), layout="constrained")
-        ax = figure.subplots()
+        figure, ((ax,),) = panes((4.6, 4.2))
         for name, curve in curves.items():
             if curve.edges:
                 ax.step(curve.distance_m, curve.share, where="post", color=colour_of(name),
@@ -101,7 +99,7 @@ def error_distribution(curves: Mapping[str, HitCurve]) -> bytes:
                title="Edges detected within a distance")
         ax.grid(alpha=0.25)
         ax.legend(loc="lower right", frameon=False)
-        return png(figure)
+    return figure
 
 
 def _accelerations(ax: Axes, plotted: PlottedFlight) -> None:

@@ -1,0 +1,68 @@
+"""Figures as files: of their own size, the same wherever they are made, and without pyplot."""
+
+import xml.etree.ElementTree as ElementTree
+
+import matplotlib
+import numpy as np
+import pytest
+
+from airtouch.errors import AirTouchError
+from airtouch.report import style
+
+SIZE_IN = (4.0, 3.0)
+
+
+def drawn(room=None):
+    """A plot of one curve, in the style of all plots."""
+    with style.style():
+        figure, ((ax,),) = style.panes(SIZE_IN, room=room)
+        ax.plot([0.0, 1.0], [2.0, 3.0])
+        ax.set(xlabel="time, s", ylabel="height, m")
+    return figure
+
+
+@pytest.mark.parametrize(("form", "first"), [("png", b"\x89PNG\r\n\x1a\n"), ("svg", b"<?xml"), ("pdf", b"%PDF-")])
+def test_equal_figures_are_equal_files_of_the_format(form, first):
+    data = style.image(drawn(), form)
+    assert data.startswith(first) and data == style.image(drawn(), form)
+    assert style.image(drawn(), "png") != style.image(drawn(style.Room(1.0, 0.5, 0.3)), "png")
+
+
+def test_a_vector_file_has_the_size_of_the_figure_and_its_text_as_glyphs_that_journals_take():
+    """72 points an inch. Some journals refuse fonts of type 3, the default of matplotlib."""
+    root = ElementTree.fromstring(style.image(drawn(), "svg"))
+    assert (root.get("width"), root.get("height")) == ("288pt", "216pt")
+    pdf = style.image(drawn(), "pdf")
+    assert b"/MediaBox [ 0 0 288 216 ]" in pdf and b"/FontFile2" in pdf and b"/Type3" not in pdf
+
+
+def test_a_figure_that_is_saved_by_its_user_looks_as_in_the_page():
+    """Ticks are made when a figure is saved: with another size of font they would be larger than its other text."""
+    with matplotlib.rc_context({"font.size": 20.0}):
+        figure = drawn()
+        figure.draw_without_rendering()
+        (ax,) = figure.axes
+        texts = [ax.xaxis.label, *ax.get_xticklabels(), *ax.get_yticklabels()]
+        assert {text.get_fontsize() for text in texts} == {9.0}
+        assert style.image(figure) == style.image(drawn())
+    assert style.image(figure) == style.image(drawn())
+
+
+@pytest.mark.parametrize(("name", "first"), [("a.svg", b"<?xml"), ("a.PDF", b"%PDF-"), ("a.png", b"\x89PNG"),
+                                             ("a.plot", b"\x89PNG"), ("a", b"\x89PNG")])
+def test_the_ending_of_a_file_is_its_format(name, first, tmp_path):
+    style.write_image(drawn(), tmp_path / name)
+    assert (tmp_path / name).read_bytes().startswith(first)
+    with pytest.raises(AirTouchError, match="--force"):
+        style.write_image(drawn(), tmp_path / name)
+    style.write_image(drawn(), tmp_path / name, force=True)
+
+
+def test_panes_of_a_fixed_layout_leave_the_room_that_was_asked_for():
+    room = style.Room(left_in=1.0, below_in=0.5, above_in=0.25, right_in=0.5, top_in=0.25)
+    figure, axes = style.panes(SIZE_IN, 2, 1, room)
+    (upper,), (lower,) = axes
+    assert np.multiply(lower.get_position().min, SIZE_IN) == pytest.approx((1.0, 0.5))
+    assert np.multiply(upper.get_position().max, SIZE_IN) == pytest.approx((3.5, 2.5))
+    between = (upper.get_position().y0 - lower.get_position().y1) * SIZE_IN[1]
+    assert between == pytest.approx(0.25) and upper.get_shared_x_axes().joined(upper, lower)
