@@ -66,3 +66,34 @@ def test_panes_of_a_fixed_layout_leave_the_room_that_was_asked_for():
     assert np.multiply(upper.get_position().max, SIZE_IN) == pytest.approx((3.5, 2.5))
     between = (upper.get_position().y0 - lower.get_position().y1) * SIZE_IN[1]
     assert between == pytest.approx(0.25) and upper.get_shared_x_axes().joined(upper, lower)
+
+
+def marks(ax, marker):
+    """Places in x of the marks at an edge of the pane."""
+    return [x for line in ax.get_lines() if line.get_marker() == marker for x in line.get_xdata()]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_where_a_curve_leaves_its_pane_a_mark_shows_its_farthest_point(sign):
+    """Twice above by 3 samples of 2000, the second beside a gap, once below by one; at 11, 21 and 31 they are
+    farthest."""
+    y = np.sin(np.arange(2000))
+    y[10:13], y[20:23], y[31], y[23:26] = (5.0, 9.0, 5.0), (5.0, 8.0, 6.0), -9.0, np.nan
+    _, ((ax,),) = style.panes(SIZE_IN)
+    ax.plot(np.arange(2000), sign * y, color="red")
+    style.limit(ax, sign * y)
+    low, high = ax.get_ylim()
+    assert -5.0 < low < -1.0 and 1.0 < high < 5.0
+    above, below = ("^", "v") if sign > 0.0 else ("v", "^")
+    assert (marks(ax, above), marks(ax, below)) == ([11, 21], [31])
+    ends = {marker: ax.transAxes.inverted().transform(line.get_transform().transform(line.get_xydata()))[:, 1]
+            for line in ax.get_lines()[1:] for marker in (line.get_marker(),)}
+    assert set(ends["^"]) == {1.0} and set(ends["v"]) == {0.0}
+    assert {line.get_color() for line in ax.get_lines()} == {"red"}
+
+
+def test_a_curve_within_its_pane_has_no_mark():
+    _, ((ax,),) = style.panes(SIZE_IN)
+    ax.plot(np.sin(np.arange(2000)))
+    style.limit(ax, np.sin(np.arange(2000)))
+    assert len(ax.get_lines()) == 1

@@ -40,7 +40,8 @@ NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip i
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
-AXIS_LIMITS = "An axis holds the middle 99 % of each curve."  #: in the plot of a signal, by `style.limit`
+#: in the plot of a signal, by `style.limit`
+AXIS_LIMITS = "An axis holds the middle 99 % of each curve; a triangle at its edge is where a curve leaves it."
 PLOTS = ("signal", "spectra", "commands")  #: names of the page's plots, in its order
 MOST_NAMED = 5  #: flights that the page names; chosen
 
