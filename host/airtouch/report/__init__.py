@@ -1,7 +1,7 @@
 """Pages, plots and tables: they render what the other packages have worked out.
 
 gap_report, gap_tables, gap_figures     the page of `airtouch gap`: its frame, its tables, its plots
-blind_figures                           the figures of a sealed set beside their goals, and its plot
+blind_tables, blind_figures             a sealed set: its figures beside their goals, and its plot
 evaluation_report, evaluation_figures   the page on scored flights, and its plots
 columns                                 the columns of score tables, which the terminal shows too
 map_figure                              the plot of an edge map

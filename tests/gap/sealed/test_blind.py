@@ -6,6 +6,7 @@ import pickle
 import re
 import select
 import signal
+import sys
 import time
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -29,7 +30,7 @@ from airtouch.gap.sealed import score as blind_score
 from airtouch.gap.sealed import severity as blind_severity
 from airtouch.gap.sealed.severity import three_severities
 from airtouch.gap.signatures.random_draws import KINDS
-from airtouch.report import blind_figures
+from airtouch.report import blind_tables
 from gap_flights import without_fits
 
 ROOT = Path(__file__).parents[3]
@@ -248,6 +249,18 @@ def test_command_writes_figures(blind_check, tmp_path):
     assert "false alarms" in result.output
 
 
+def test_a_score_without_a_plot_needs_no_matplotlib(blind_check, monkeypatch):
+    folder = blind_check[0]
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    for name in [name for name in sys.modules if name.startswith(("matplotlib.", "airtouch.report."))]:
+        monkeypatch.delitem(sys.modules, name)
+    score = ["blind", "score", str(folder), str(folder / "answers")]
+    result = CliRunner().invoke(command, score)
+    assert result.exit_code == 0 and "false alarms" in result.output, result.output
+    refused = CliRunner().invoke(command, [*score, "--plot", str(folder / "p.png")]).exception
+    assert isinstance(refused, AirTouchError) and "--plot needs matplotlib: pip install" in str(refused)
+
+
 def test_wilson_and_auroc_in_closed_form():
     half = intervals.wilson(5, 10)
     z2 = 1.959964 ** 2
@@ -325,7 +338,7 @@ def test_a_wrong_rotor_or_loop_is_told_beside_the_right_name():
     assert (coverage["hits"], coverage["n"]) == (2, 5)  # the mass, 0.1 answered 0.2, and motor b are within theirs
     assert error["n"] == 5 and error["value"] == pytest.approx(1.0)  # 1, 0, 1, 5 (rate 1.2 answered 0.2), 1
     assert ("right rotor or loop, where the first answer is right", "4") in {
-        (name, n) for name, _, n, _ in blind_figures.score_rows(figures)}
+        (name, n) for name, _, n, _ in blind_tables.score_rows(figures)}
 
 
 @pytest.mark.parametrize(("name", "drawn", "answered", "error"), [
@@ -469,9 +482,9 @@ def test_the_goals_are_those_of_the_page_and_of_figures_of_a_score(blind_check):
     on_page = [re.findall(r"0\.\d+|\d+", line.split("|")[-2]) for line in table.splitlines()]
     goals = dict.fromkeys(goal for text in blind_score.GOALS.values() for goal in re.findall(r"0\.\d+|\d+", text))
     assert [goal for row in on_page for goal in row] == list(goals)
-    shown = [place for _, place in blind_figures.figures_shown(["all", *blind_score.SEVERITIES])]
+    shown = [place for _, place in blind_tables.figures_shown(["all", *blind_score.SEVERITIES])]
     assert set(blind_score.GOALS) <= set(shown)
-    rows = {name: (value, n, goal) for name, value, n, goal in blind_figures.score_rows(blind_check[1])}
+    rows = {name: (value, n, goal) for name, value, n, goal in blind_tables.score_rows(blind_check[1])}
     assert rows["top-1, single effects"][1:] == ("4", "at least 95 %")
     assert rows["pairs: exact set"][1:] == ("2", "at least 85 %")
 
@@ -480,5 +493,5 @@ def test_an_auroc_has_the_number_of_its_own_flights():
     """Of flights that the data can tell apart, where there are fewer of them: 3 of 10."""
     of_all = {"auroc": 0.9, "auroc_told_apart": 0.99, "wrong_name": {"value": 0.3, "low": 0.1, "high": 0.5, "n": 10},
               "wrong_name_told_apart": {"value": 0.1, "low": 0.0, "high": 0.4, "n": 3}}
-    rows = {name: n for name, _, n, _ in blind_figures.score_rows({"unknown": {"all": of_all}})}
+    rows = {name: n for name, _, n, _ in blind_tables.score_rows({"unknown": {"all": of_all}})}
     assert sorted(n for name, n in rows.items() if "AUROC" in name) == ["10", "3"]

@@ -60,7 +60,8 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
     from airtouch.extras import need
     from airtouch.gap.sealed import score as sealed
 
-    need("plots", "scoring a sealed set")
+    if plot:
+        need("plots", "--plot")
     check_all_free((json_path, plot), force)
     _print_score(sealed.score(folder, answers, key), json_path, plot, force)
 
@@ -107,11 +108,10 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     """Print the score of a blind check, and write it to files."""
     from rich.table import Table
 
-    from airtouch.report import blind_figures
-    from airtouch.report.style import write_image
+    from airtouch.report import blind_tables
 
-    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_figures.score_rows(figures)),
-                        (("kind", "effect in top-1", "top-3", "parameter error"), blind_figures.effect_rows(figures))):
+    for heads, rows in ((("figure (95 % interval)", "measured", "n", "goal"), blind_tables.score_rows(figures)),
+                        (("kind", "effect in top-1", "top-3", "parameter error"), blind_tables.effect_rows(figures))):
         table = Table(*heads)
         for row in rows:
             table.add_row(*row)
@@ -119,5 +119,8 @@ def _print_score(figures: dict[str, Any], json_path: Path | None, plot: Path | N
     if json_path:
         output.write_json(json_path, figures, force)
     if plot:
+        from airtouch.report import blind_figures
+        from airtouch.report.style import write_image
+
         write_image(blind_figures.confusion_and_reliability(figures), plot, force)
     written(json_path, plot)
