@@ -203,7 +203,7 @@ def test_plots_of_a_result_are_figures_to_restyle_and_save(path, tmp_path):
         figure.savefig(tmp_path / f"{name}.svg")
         assert "of a paper" in (tmp_path / f"{name}.svg").read_text()  # a comment beside the glyphs
     assert at.gap.plots(measured)["signal"].axes[0].get_title() == ""
-    assert len(plots["spectra"].axes) == len(measured.pictures.spectra) > 0
+    assert len(plots["spectra"].axes) == len(measured.curves.spectra) > 0
     without = at.gap.measure(path)
     assert without == measured
     with pytest.raises(AirTouchError, match="plots=True"):

@@ -209,7 +209,7 @@ def diagnose(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Pat
         check_free(Path(report), force)
     logs, nominal = _logs(flights), _logs(baseline)
     diagnosis = module.diagnose(logs, _vehicle(vehicle, [*logs, *nominal]), nominal, without=without,
-                                pictures=plots or report is not None)
+                                curves=plots or report is not None)
     if report is not None:
         gap_report.write_diagnosis(Path(report), diagnosis, command="airtouch.gap.diagnose(...)", force=force)
     return diagnosis
@@ -224,7 +224,7 @@ def measure(flights: "Flight | Iterable[Flight]", vehicle: "Vehicle | str | Path
     logs, nominal = _logs(flights), _logs(baseline)
     craft = _vehicle(vehicle, [*logs, *nominal])
     measurement = module.measure(logs, craft, nominal)
-    return replace(measurement, pictures=module.pictures_of_measurement(measurement, logs, craft)) if plots \
+    return replace(measurement, curves=module.curves_of_measurement(measurement, logs, craft)) if plots \
         else measurement
 
 
@@ -241,9 +241,9 @@ def plots(result: "Diagnosis | Measurement") -> "dict[str, Figure]":
     from airtouch.report import gap_report
 
     need("plots", "a plot")
-    if result.pictures is None:
+    if result.curves is None:
         raise AirTouchError("this result has no curves to plot; call diagnose or measure with plots=True")
-    return gap_report.figures(result.pictures)
+    return gap_report.figures(result.curves)
 
 
 @in_python

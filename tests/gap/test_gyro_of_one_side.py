@@ -6,7 +6,7 @@ from airtouch import vehicle
 from airtouch.gap import example
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.flights.flight import ready_alike
-from airtouch.gap.measurement import measure, pictures_of_measurement
+from airtouch.gap.measurement import curves_of_measurement, measure
 from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 
@@ -69,5 +69,5 @@ def test_a_map_against_a_baseline_without_a_gyro_has_no_channel_of_it(nominal):
 @pytest.mark.parametrize(("baseline_is_bare", "drawn"), [(True, False), (False, True)])
 def test_the_gyro_is_drawn_where_the_map_has_it(real, nominal, baseline_is_bare, drawn):
     base = [bare(log) if baseline_is_bare else log for log in nominal[:3]]
-    signal = pictures_of_measurement(measure([real], VEHICLE, base, calibrated=False), [real], VEHICLE).signal
+    signal = curves_of_measurement(measure([real], VEHICLE, base, calibrated=False), [real], VEHICLE).signal
     assert signal.channel == "torque_z" and (signal.measured is not None) == drawn

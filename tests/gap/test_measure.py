@@ -10,7 +10,7 @@ import short_flights
 from airtouch import logs, vehicle
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measurement import Measurement, measure, pictures_of_measurement
+from airtouch.gap.measurement import Measurement, curves_of_measurement, measure
 from airtouch.gap.where.cell import BASELINE, GapMap
 from airtouch.gap.where.rotor_speeds import RotorSpeed
 from airtouch.gap.where.summary import significant
@@ -60,9 +60,9 @@ def test_spectra_show_the_floor_of_the_baseline(sweeps):
     nominal = [louder(log, k) for k, log in enumerate(sweeps)]
     real = [pushed(louder(log, 10 + k), 3.0, "over platform") for k, log in enumerate(sweeps)]
     gap = measure(real, VEHICLE, nominal, calibrated=False)
-    pictures = pictures_of_measurement(gap, real, VEHICLE)
-    (force,) = [s for s in pictures.spectra if s.channel == "force_x"]
-    high = pictures.frequency_hz > 10.0
+    curves = curves_of_measurement(gap, real, VEHICLE)
+    (force,) = [s for s in curves.spectra if s.channel == "force_x"]
+    high = curves.frequency_hz > 10.0
     assert np.median(force.floor[high]) == pytest.approx(1.0 / 50.0, rel=0.3)
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airtouch.gap.answer.pictures import Signal, Spectrum
+from airtouch.gap.answer.curves import Signal, Spectrum
 from airtouch.logs.segments import KINDS
 from airtouch.report import gap_figures
 

@@ -17,7 +17,7 @@ from airtouch.errors import AirTouchError
 from airtouch.gap.answer import advice
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.flights.flight import ready
-from airtouch.gap.measurement import measure, pictures_of_measurement
+from airtouch.gap.measurement import curves_of_measurement, measure
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import FITTED, HELD_OUT, Closure, NamedEffect, OpenCell, Quantity, Rejected
 from airtouch.gap.signatures.candidates import term_of
@@ -80,9 +80,9 @@ def test_the_curve_of_a_random_effect_is_explained_where_one_is_named(pushed_fli
 def test_only_phases_that_are_drawn_are_explained(pushed_flights, tmp_path):
     """The flights hover alone; with take-off among their phases it is."""
     result = of_flights(pushed_flights)
-    signal = replace(result.pictures.signal, phase=np.full(len(result.pictures.signal.time_s), KINDS.index("hover")))
-    hover = replace(result, pictures=replace(result.pictures, signal=signal))
-    rising = replace(result, pictures=replace(result.pictures, signal=replace(
+    signal = replace(result.curves.signal, phase=np.full(len(result.curves.signal.time_s), KINDS.index("hover")))
+    hover = replace(result, curves=replace(result.curves, signal=signal))
+    rising = replace(result, curves=replace(result.curves, signal=replace(
         signal, phase=np.full(len(signal.time_s), KINDS.index("take-off")), acts_s=((1.0, 2.0),))))
     texts = []
     for name, one in (("hover", hover), ("rising", rising)):
@@ -190,7 +190,7 @@ def test_what_stays_open_is_on_the_page_with_its_seconds_and_the_nearest_effects
 
 def test_page_of_a_measurement(pushed_flights, tmp_path):
     path, gap = tmp_path / "gap.html", measure(pushed_flights, VEHICLE)
-    gap = replace(gap, pictures=pictures_of_measurement(gap, pushed_flights, VEHICLE))
+    gap = replace(gap, curves=curves_of_measurement(gap, pushed_flights, VEHICLE))
     gap_report.write_measurement(path, gap, command="airtouch gap measure x")
     text, page = checked(path)
     assert text.index("Most of the gap lies") < text.index("On the ground") < text.index("The largest cells")
@@ -204,7 +204,7 @@ def test_the_report_computes_nothing():
         lines = re.findall(r"^ *from (airtouch\.(?:gap|simulation)[\w.]*) import (.+)$", source, re.M)
         imports = {f"{module}.{item}." for module, names in lines for item in names.replace(" ", "").split(",")}
         allowed = ("measurement", "result", "where.cell", "where.cell_words", "where.summary", "answer.advice",
-                   "answer.pictures", "answer.sentences", "answer.words", "signals.channels", "second_process")
+                   "answer.curves", "answer.sentences", "answer.words", "signals.channels", "second_process")
         packages = tuple(f"airtouch.gap.{a}." for a in allowed)
         assert imports and all(u.startswith(packages) for u in imports), (name, imports)
         assert not re.search(r"\b(residual|calibrate|ready|closure_of|gap_map)\(", source)

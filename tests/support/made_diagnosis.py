@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import short_flights
 from airtouch import vehicle
-from airtouch.gap.answer.pictures import pictures_of
+from airtouch.gap.answer.curves import curves_of
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal.build_study import declared_study
 from airtouch.gap.result import Closure, Control, Diagnosis, NamedEffect, NextStep, Quantity, RankedCandidate
@@ -49,6 +49,6 @@ def of_flights(logs, effects=(FOUND,), **more):
     terms = [term_of(e) for e in effects]
     whole = gap_map(study, flights, terms=terms)
     result = diagnosis(whole.cells, effects=effects, **more)
-    pictures = pictures_of(study, flights, [], terms, [result.headline, *whole.cells] if result.headline else [],
-                           whole.cells)
-    return replace(result, where=tuple(summary.cells_to_show(whole)), pictures=pictures)
+    curves = curves_of(study, flights, [], terms, [result.headline, *whole.cells] if result.headline else [],
+                       whole.cells)
+    return replace(result, where=tuple(summary.cells_to_show(whole)), curves=curves)

@@ -9,9 +9,9 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.answer.advice import next_steps
 from airtouch.gap.answer.controls import arms_of, control_of
+from airtouch.gap.answer.curves import curves_of
 from airtouch.gap.answer.named_effects import named_effects
 from airtouch.gap.answer.notes import at_end_of_range, cannot_be_replayed, mostly_random, signs_not_shown
-from airtouch.gap.answer.pictures import pictures_of
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
 from airtouch.gap.answer.shrink import Gap, closure_of, gap_of
 from airtouch.gap.answer.unexplained import unexplained
@@ -71,13 +71,13 @@ class Comparison:
 
 def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[FlightLog] = (), *,
              progress: Callable[[str], None] | None = None, without: Iterable[str] = (),
-             pictures: bool = False, before: Diagnosis | None = None, partner: Sequence[FlightLog] = ()) -> Diagnosis:
+             curves: bool = False, before: Diagnosis | None = None, partner: Sequence[FlightLog] = ()) -> Diagnosis:
     """Name the unmodelled effect that the flights have in common and how much of the gap it is.
 
     flights: one or more; what they share is looked for. baseline: flights declared free of
     unmodelled effects, on which the vehicle is calibrated and the floor is measured; without
     them the floor is the sensors' declared noise and the command view is left out. without:
-    names of effects to leave out. pictures: whether to keep the curves that a report shows. before: a
+    names of effects to leave out. curves: whether to keep the curves that a report shows. before: a
     diagnosis with the same vehicle, baseline and effects left out, whose calibration is used again. partner: logs of
     other vehicles in the air with one flight, on its clock and in its frame; where one is overhead, a wake is judged in
     these seconds, if there is a baseline. Raises AirTouchError when no flight can be used, for a partner of several
@@ -96,7 +96,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     if balance_result.applies(usable, nominal, vehicle):
         notes += [overhead.UNUSED.format("a gyro")] if partner else []
         return balance_result.diagnosis(usable, nominal, vehicle, [*notes_on(usable, nominal), *notes], without,
-                                        pictures)
+                                        curves)
     say("calibration")
     calibrated_with = (vehicle, tuple(_content(f) for f in nominal), tuple(sorted(without)))
     if before is not None and before.calibrated is not None:
@@ -118,7 +118,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     say("how far")
     result = _answer(data, selection, gap)
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)
-    return replace(_explained(result, comparison, selection, pictures), notes=_notes(comparison, notes),
+    return replace(_explained(result, comparison, selection, curves), notes=_notes(comparison, notes),
                    calibrated=calibrated, calibrated_with=calibrated_with)
 
 
@@ -159,10 +159,10 @@ def _answer(data: Data, selection: Selection, gap: Gap) -> Diagnosis:
         control=control_of(data, selection, gap) if is_effect else None)
 
 
-def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, pictures: bool) -> Diagnosis:
+def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, curves: bool) -> Diagnosis:
     """The answer with what it is compared with: the map and its largest cells, arms, what stays open, what to fly next.
 
-    pictures: whether to keep the curves that a report shows.
+    curves: whether to keep the curves that a report shows.
     """
     study, usable, nominal, judged = comparison.study, comparison.usable, comparison.nominal, comparison.judged
     is_effect, terms = result.verdict == "effect", [t for e in result.effects for t in candidates.terms_of(e)]
@@ -177,8 +177,8 @@ def _explained(result: Diagnosis, comparison: Comparison, selection: Selection, 
         flights=tuple(f.name for f in usable),
         vehicle=comparison.vehicle.name, baseline=tuple(f.name for f in nominal),
         calibration=comparison.calibration.parameters if comparison.calibration else {},
-        pictures=pictures_of(study, usable, nominal, terms, cells if headline else (), whole_map.cells)
-        if pictures else None)
+        curves=curves_of(study, usable, nominal, terms, cells if headline else (), whole_map.cells)
+        if curves else None)
     return replace(answer, next=next_steps(answer, usable, comparison.vehicle, bool(flown_unlike(study, usable))))
 
 

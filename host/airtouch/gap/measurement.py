@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from airtouch.errors import AirTouchError
-from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures, pictures_of
+from airtouch.gap.answer.curves import MOST_FLIGHTS, Curves, curves_of
 from airtouch.gap.flights.fitness import cannot_of, notes_of
 from airtouch.gap.flights.flight import (
     GYRO_UNUSED,
@@ -43,7 +43,7 @@ class Measurement:
     calibrated on them; calibration: those parameters; spectra: of the commands, None without a steady stretch in
     flight; rotors: speeds as logged and as modelled, in the air, 1/min; left_out: reasons why
     flights were not used; study: what the map holds them against; nominal: the baseline flights, whose floor the
-    pictures show; pictures: of `pictures_of_measurement`, where they were asked for; uses_gyro: whether a gyro that the
+    curves show; curves: of `curves_of_measurement`, where they were asked for; uses_gyro: whether a gyro that the
     flights have is used, as it is where the baseline has one.
     """
 
@@ -61,7 +61,7 @@ class Measurement:
     left_out: tuple[str, ...] = ()
     study: Study | None = field(default=None, compare=False, repr=False)
     nominal: tuple[Flight, ...] = field(default=(), compare=False, repr=False)
-    pictures: Pictures | None = field(default=None, compare=False, repr=False)
+    curves: Curves | None = field(default=None, compare=False, repr=False)
     uses_gyro: bool = field(default=True, compare=False, repr=False)
 
     @property
@@ -193,12 +193,12 @@ def measured_flight(studies: Sequence[Study], log: FlightLog, uses_gyro: bool = 
                           name_in(log.meta))
 
 
-def pictures_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Pictures:
+def curves_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Curves:
     """The curves of a measurement, of its first flights."""
     first = (log if measurement.uses_gyro else without_gyro(log) for log in islice(logs, MOST_FLIGHTS))
     flights = with_gyro_if_any(list(ready_flights(first, vehicle, [])), []) if measurement.where else []
     if not flights:
-        return Pictures(commands=measurement.spectra)
-    curves = pictures_of(measurement.study or declared_study(vehicle, ()), flights, measurement.nominal, [],
-                         measurement.where, measurement.map.cells)
+        return Curves(commands=measurement.spectra)
+    curves = curves_of(measurement.study or declared_study(vehicle, ()), flights, measurement.nominal, [],
+                       measurement.where, measurement.map.cells)
     return replace(curves, commands=measurement.spectra)

@@ -9,7 +9,7 @@ import numpy as np
 from airtouch.gap.where.cell import Cell, GapMap, plain_cell
 
 if TYPE_CHECKING:  # which import this module
-    from airtouch.gap.answer.pictures import Pictures
+    from airtouch.gap.answer.curves import Curves
     from airtouch.gap.nominal.calibrate import Calibration
     from airtouch.gap.study import Study
     from airtouch.vehicle import Vehicle
@@ -216,8 +216,8 @@ class Diagnosis:
     judged_on: str = HELD_OUT
     baseline: tuple[str, ...] = ()
     calibration: Mapping[str, Quantity] = field(default_factory=dict)  #: of the vehicle, on the baseline flights
-    #: `gap.answer.pictures.Pictures`, where they were asked for
-    pictures: "Pictures | None" = field(default=None, repr=False, compare=False)
+    #: `gap.answer.curves.Curves`, where they were asked for
+    curves: "Curves | None" = field(default=None, repr=False, compare=False)
     #: study and calibration, to diagnose further flights alike
     calibrated: "tuple[Study, Calibration | None] | None" = field(default=None, repr=False, compare=False)
     #: of that calibration the vehicle, name and hash of the baseline flights, those left out included, and the names of

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from airtouch.gap.answer.pictures import MeanSpectra, Signal, Spectrum
+from airtouch.gap.answer.curves import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.logs.segments import KINDS
 from airtouch.report.style import BLUE, GREEN, GREY, RED, TITLE_AT, Room, limit, panes, style

@@ -19,7 +19,7 @@ from airtouch import __version__
 from airtouch.extras import lacking
 from airtouch.gap.answer import words
 from airtouch.gap.answer.advice import ADD_AN_EFFECT
-from airtouch.gap.answer.pictures import MOST_FLIGHTS, Pictures
+from airtouch.gap.answer.curves import MOST_FLIGHTS, Curves
 from airtouch.gap.answer.sentences import sentences
 from airtouch.gap.measurement import Measurement
 from airtouch.gap.result import Diagnosis
@@ -36,7 +36,7 @@ from airtouch.report.html_page import embedded, rendered
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NO_PICTURES = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
+NO_PLOTS = "Pictures are left out, because matplotlib is not installed: pip install 'airtouch[plots]'"
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
@@ -55,10 +55,10 @@ def write_measurement(path: Path, measurement: Measurement, *, command: str, for
         title="Gap between flights and simulator", headline=measurement.headline,
         answers=measurement.sentences,
         cells=measurement.map.cells, floor_from=measurement.map.floor_from, where=measurement.where,
-        pictures=measurement.pictures, calibration=gap_tables.parameter_rows(measurement.calibration),
+        curves=measurement.curves, calibration=gap_tables.parameter_rows(measurement.calibration),
         lists=[("Rotor speeds in the air", [r.in_words() for r in measurement.rotors]),
                ("What these logs cannot say", measurement.cannot),
-               ("Notes", _notes(measurement.notes, measurement.pictures)), ("Left out", measurement.left_out)],
+               ("Notes", _notes(measurement.notes, measurement.curves)), ("Left out", measurement.left_out)],
         flights=_flights(measurement.flights, measurement.vehicle, measurement.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
@@ -77,19 +77,19 @@ def write_diagnosis(path: Path, diagnosis: Diagnosis, *, command: str, force: bo
         ranking=gap_tables.ranking_rows(diagnosis), data_of_shrink=words.data_of_shrink(diagnosis),
         indistinguishable=[f"These logs cannot tell {words.joined(list(g))} apart."
                            for g in diagnosis.indistinguishable],
-        pictures=diagnosis.pictures, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
+        curves=diagnosis.curves, how_far=gap_tables.how_far_rows(diagnosis) if diagnosis.effects else [],
         phase_figures=gap_tables.phase_rows(summary.phases(cells)) if diagnosis.effects else [],
         remaining=remaining_in_words(gap_tables.remaining_to_name(remaining, diagnosis.headline)),
         remaining_count=len(remaining),
         unexplained=words.all_open_in_words(diagnosis.unexplained), nearest=words.nearest_in_words(diagnosis),
         calibration=gap_tables.parameter_rows(diagnosis.calibration),
         lists=[("What these logs cannot say", diagnosis.cannot),
-               ("Notes", _notes(diagnosis.notes, diagnosis.pictures))],
+               ("Notes", _notes(diagnosis.notes, diagnosis.curves))],
         flights=_flights(diagnosis.flights, diagnosis.vehicle, diagnosis.baseline), command=command)
     write_bytes(page.encode(), path, force)
 
 
-def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], pictures: Pictures | None,
+def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell], curves: Curves | None,
           **context: Any) -> str:
     """The HTML of a page: what diagnosis and measurement share, and `context`, whose parts a page may lack."""
     absent = {"effects": [], "ranking": [], "indistinguishable": [], "how_far": [],
@@ -100,7 +100,7 @@ def _page(*, cells: Sequence[Cell], headline: Cell | None, where: Sequence[Cell]
         **absent, **context, "phases": gap_tables.maps(cells, headline), "bands": gap_tables.bands(cells),
         "legend": gap_tables.LEGEND, "has_headline": headline is not None,
         "where": gap_tables.largest_rows(where, headline), "where_note": gap_tables.order_of_largest(where, headline),
-        "images": _images(pictures),
+        "images": _images(curves),
         "example": example_effect() if shows_how_to_add else "",
         "has_after": any(c.after is not None for c in cells), "has_worse": bool(summary.worse(cells)),
         "has_intervals": any(c.low is not None for c in cells), "version": __version__})
@@ -111,9 +111,9 @@ def example_effect() -> str:
     return (resources.files("airtouch.simulation.effects") / "own_effect.py.txt").read_text("utf-8")
 
 
-def _notes(notes: Sequence[str], pictures: Pictures | None) -> list[str]:
-    """The notes, and one more if pictures cannot be drawn for want of matplotlib."""
-    return [*notes, *([NO_PICTURES] if pictures is not None and lacking("plots") else [])]
+def _notes(notes: Sequence[str], curves: Curves | None) -> list[str]:
+    """The notes, and one more if plots cannot be drawn for want of matplotlib."""
+    return [*notes, *([NO_PLOTS] if curves is not None and lacking("plots") else [])]
 
 
 class Plot(NamedTuple):
@@ -125,9 +125,9 @@ class Plot(NamedTuple):
     draw: Callable[[], "Figure"]
 
 
-def figures(pictures: Pictures | None) -> dict[str, "Figure"]:
+def figures(curves: Curves | None) -> dict[str, "Figure"]:
     """The plots of the page by their names, as far as there are any. Needs matplotlib."""
-    return {plot.name: plot.draw() for plot in _plots(pictures)}
+    return {plot.name: plot.draw() for plot in _plots(curves)}
 
 
 def plot_files(folder: Path) -> list[Path]:
@@ -135,7 +135,7 @@ def plot_files(folder: Path) -> list[Path]:
     return [folder / f"{name}.{form}" for name in PLOTS for form in ("svg", "pdf")]
 
 
-def write_plots(folder: Path, pictures: Pictures | None, force: bool = False) -> list[Path]:
+def write_plots(folder: Path, curves: Curves | None, force: bool = False) -> list[Path]:
     """Write the plots of the page to a folder, each as SVG and PDF, and return the files; needs matplotlib.
 
     Raises AirTouchError for a file that exists, without `force`.
@@ -143,66 +143,66 @@ def write_plots(folder: Path, pictures: Pictures | None, force: bool = False) ->
     from airtouch.report.style import write_image
 
     make_folder(folder)
-    drawn = figures(pictures)
+    drawn = figures(curves)
     files = [file for file in plot_files(folder) if file.stem in drawn]
     for file in files:
         write_image(drawn[file.stem], file, force)
     return files
 
 
-def _images(pictures: Pictures | None) -> list[dict[str, str]]:
+def _images(curves: Curves | None) -> list[dict[str, str]]:
     """The plots as data URLs, each with title and text; none where they are not asked for or cannot be drawn.
 
     Where a second core is idle, a second process draws some of them at the same time.
     """
-    if pictures is None or lacking("plots"):
+    if curves is None or lacking("plots"):
         return []
-    plots = _plots(pictures)
+    plots = _plots(curves)
     drawn = map_on_two_cores(lambda plot: embedded(plot.draw()), plots)
     return [{"title": plot.title, "data": data, "text": plot.text} for plot, data in zip(plots, drawn, strict=True)]
 
 
-def _plots(pictures: Pictures | None) -> list[Plot]:
+def _plots(curves: Curves | None) -> list[Plot]:
     """Plots of the headline's signal, of the gap's spectra and of the commands' spectra, as far as there are any."""
     from airtouch.report import gap_figures
 
     plots: list[Plot] = []
-    if pictures is None:
+    if curves is None:
         return plots
-    if pictures.signal is not None:
-        signal = pictures.signal
+    if curves.signal is not None:
+        signal = curves.signal
         phases = {KINDS[kind] for kind in np.unique(signal.phase)}
         caption = [f"Flight {Path(signal.flight).name}.",
                    *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
                    *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
                    *(["Yellow: over a platform."] if "over platform" in phases else []),
                    *(["Green bar: the effect acts."] if signal.acts_s else []),
-                   *_curves_of_a_random_effect(pictures), AXIS_LIMITS]
+                   *_curves_of_a_random_effect(curves), AXIS_LIMITS]
         low, high = signal.band_hz
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
-    if pictures.spectra:
+    if curves.spectra:
         text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
                 "of a constant gap.")
-        if pictures.random:
+        if curves.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
                      "counts as gap.")
         plots.append(Plot("spectra", "Spectra of the gap in the air", text,
-                          partial(gap_figures.spectra, pictures.frequency_hz, pictures.spectra)))
-    if pictures.commands is not None:
+                          partial(gap_figures.spectra, curves.frequency_hz, curves.spectra)))
+    if curves.commands is not None:
         plots.append(Plot("commands", "Spectra of the motor commands",
                           "Delays, gains and noise in the loop show here, as a shape that differs. They are looked for "
                           "in the loops of thrust, roll and pitch alone, so the yaw command is not drawn.",
-                          partial(gap_figures.commands, pictures.commands)))
+                          partial(gap_figures.commands, curves.commands)))
     return plots
 
 
-def _curves_of_a_random_effect(pictures: Pictures) -> list[str]:
+def _curves_of_a_random_effect(curves: Curves) -> list[str]:
     """What the curves of the signal with a random effect are; nothing without one."""
-    if not pictures.random or pictures.signal is None:
+    if not curves.random or curves.signal is None:
         return []
-    if pictures.signal.after is None:
+    if curves.signal.after is None:
         return ["The effect is random and has no mean in this channel, so no curve is drawn with it."]
     return ["Of a random effect these curves hold the mean alone."]
 

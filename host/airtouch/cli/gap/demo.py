@@ -42,7 +42,7 @@ def demo_command(out: Path, force: bool) -> None:
 
         nominal = [read(p) for p in example.nominal()]
         diagnosis = diagnose([read(example.real())], load(str(nominal[0].meta["vehicle"])), nominal, progress=say,
-                             pictures=True)
+                             curves=True)
         say("report")
         output.write_json(json_path, diagnosis.plain(), force)
         gap_report.write_diagnosis(report, diagnosis, command=typed(), force=force)

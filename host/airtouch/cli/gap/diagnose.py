@@ -68,7 +68,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         if not each:
             if not logs:
                 raise AirTouchError(next(iter(flights.failed.values()), "no flight to diagnose"))
-            diagnosis = next_commands.with_names(case(logs, progress=bar, pictures=bool(report or plots)),
+            diagnosis = next_commands.with_names(case(logs, progress=bar, curves=bool(report or plots)),
                                                  vehicle_named, real, baseline)
             if json_path:
                 output.write_json(json_path, diagnosis.plain(), force)
@@ -80,7 +80,7 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
             if plots:
                 from airtouch.report import gap_report
 
-                drawn = gap_report.write_plots(plots, diagnosis.pictures, force)
+                drawn = gap_report.write_plots(plots, diagnosis.curves, force)
     diagnosed = 1
     if each:
         diagnosed = _each(flights, case, lambda d: next_commands.with_names(d, vehicle_named, d.flights, baseline),

@@ -42,11 +42,11 @@ def measure_command(real: tuple[str, ...], vehicle_name: str | None, baseline: t
     if report or plots:
         from airtouch.report import gap_report
 
-        measurement = replace(measurement, pictures=measure.pictures_of_measurement(measurement, flights, vehicle))
+        measurement = replace(measurement, curves=measure.curves_of_measurement(measurement, flights, vehicle))
         if report:
             gap_report.write_measurement(report, measurement, force=force, command=typed(NAMES_SHOWN))
         if plots:
-            drawn = gap_report.write_plots(plots, measurement.pictures, force)
+            drawn = gap_report.write_plots(plots, measurement.curves, force)
     show.measurement(output.console(), measurement)
     show.left_out(measurement.left_out)
     written(json_path, report, *drawn)

@@ -7,5 +7,5 @@
 - `controls`: what the answer is compared with, a wrong effect and the vehicle as declared.
 - `unexplained`: what stays open, and which signals it follows (`followed_signals`).
 - `advice`: what to fly next.
-- `sentences`, `words`, `pictures`: what terminal and report show of it.
+- `sentences`, `words`, `curves`: what terminal and report show of it.
 """

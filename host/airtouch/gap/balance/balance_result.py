@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.answer.advice import next_steps
-from airtouch.gap.answer.pictures import pictures_of
+from airtouch.gap.answer.curves import curves_of
 from airtouch.gap.answer.shrink import fraction_closed
 from airtouch.gap.answer.words import joined, rotors_in_words
 from airtouch.gap.balance.hover_balance import BALANCE, Reference, evidence, reference
@@ -71,10 +71,10 @@ def _hovers(flight: Flight, vehicle: Vehicle) -> bool:
 
 
 def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Vehicle,
-              notes: Sequence[str] = (), without: Iterable[str] = (), pictures: bool = False) -> Diagnosis:
+              notes: Sequence[str] = (), without: Iterable[str] = (), curves: bool = False) -> Diagnosis:
     """Which of the hypotheses of `hover_hypotheses` the flights' mean difference from nominal ones fits best.
 
-    notes: on logs left out; without: names that are no candidates; pictures: whether to keep a report's curves. Flights
+    notes: on logs left out; without: names that are no candidates; curves: whether to keep a report's curves. Flights
     without a hover are left out, and named in a note.
     """
     without_hover = [f.name for f in (*flights, *nominal) if not _hovers(f, vehicle)]
@@ -113,9 +113,9 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        pictures=pictures_of(declared_study(vehicle, ()), flights, nominal, [],
-                             [headline, *cells] if headline else [], cells)
-        if pictures else None)
+        curves=curves_of(declared_study(vehicle, ()), flights, nominal, [],
+                           [headline, *cells] if headline else [], cells)
+        if curves else None)
     return replace(answer, next=next_steps(answer, flights, vehicle, own_effects=False))
 
 

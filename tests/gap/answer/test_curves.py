@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from airtouch.gap.answer.pictures import MOST_SPECTRA, pictures_of
+from airtouch.gap.answer.curves import MOST_SPECTRA, curves_of
 from airtouch.gap.flights.flight import PERIOD_S
 from airtouch.gap.nominal.build_study import declared_study, sensor_noise
 from airtouch.gap.result import NamedEffect, Quantity
@@ -32,12 +32,12 @@ def bias(mps2):
     return term_of(NamedEffect("imu_bias", {"acc_x": Quantity(mps2)}))
 
 
-def pictures(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR, whole_map=LOW):
-    return pictures_of(study, flights, nominal, effects, cells, whole_map)
+def curves_with(*flights, effects=(), cells=(LOWEST,), nominal=(), study=FLOOR, whole_map=LOW):
+    return curves_of(study, flights, nominal, effects, cells, whole_map)
 
 
 def test_signal_is_that_of_the_cell():
-    drawn = pictures(flight(SECONDS, FORWARD, name="pushed.csv")).signal
+    drawn = curves_with(flight(SECONDS, FORWARD, name="pushed.csv")).signal
     assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
     np.testing.assert_allclose(drawn.time_s, TIME_S)
     assert drawn.phase.shape == TIME_S.shape and drawn.after is None
@@ -51,7 +51,7 @@ def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phas
     whole_map = [*(cell("force_x", phase, 0.5, floor, band_hz=band) for phase, band, floor in floors),
                  cell("force_y", "hover", 0.5, 9.0), cell("force_x", "hover", 0.5, 9.0, regime="low")]
     phase = np.repeat([KINDS.index(k) for k in ("take-off", "hover", "landing")], len(TIME_S) // 3)
-    drawn = pictures(flight(SECONDS, FORWARD, phase=phase), whole_map=whole_map).signal
+    drawn = curves_with(flight(SECONDS, FORWARD, phase=phase), whole_map=whole_map).signal
     np.testing.assert_allclose(drawn.floor, np.repeat([1.0, 0.5, np.nan], len(TIME_S) // 3))
 
 
@@ -59,20 +59,20 @@ def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phas
 def test_two_thirds_of_white_noise_at_its_floor_lie_within_the_floor(band_hz):
     """As of any normal variable within one standard deviation: 68 %."""
     flown = [flight(60.0, noise(60.0, 1.0, i) * [1.0, 0.0, 0.0], name=str(i)) for i in range(6)]
-    drawn = pictures(flown[0], cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)],
-                     whole_map=gap_map(FLOOR, flown[:1], flown[1:]).cells).signal
+    drawn = curves_with(flown[0], cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)],
+                        whole_map=gap_map(FLOOR, flown[:1], flown[1:]).cells).signal
     assert np.mean(np.abs(drawn.before) < drawn.floor) == pytest.approx(0.683, abs=0.06)
 
 
 def test_measured_is_the_model_and_the_gap_together():
     """Of a level hover whose model has no force forward."""
-    drawn = pictures(flight(SECONDS, FORWARD)).signal
+    drawn = curves_with(flight(SECONDS, FORWARD)).signal
     np.testing.assert_allclose(drawn.before, 0.5, atol=1e-9)
     np.testing.assert_allclose(drawn.measured - drawn.before, 0.0, atol=1e-9)
 
 
 def test_the_gap_after_is_without_what_the_effects_make():
-    drawn = pictures(flight(SECONDS, FORWARD), effects=[bias(0.4)]).signal
+    drawn = curves_with(flight(SECONDS, FORWARD), effects=[bias(0.4)]).signal
     np.testing.assert_allclose(drawn.before, 0.5, atol=1e-9)
     np.testing.assert_allclose(drawn.after, 0.1, atol=1e-9)
 
@@ -89,7 +89,7 @@ def test_signal_holds_what_is_in_the_band_that_it_states(band_hz, push_hz, drawn
     """
     push, share = np.sin(2.0 * np.pi * push_hz * TIME_S), drawn_hz[0] < push_hz < drawn_hz[1]
     pushed_flight = flight(SECONDS, push[:, None] * [1.0, 0.0, 0.0] + FORWARD)
-    drawn = pictures(pushed_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
+    drawn = curves_with(pushed_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
     inside = slice(300, -300)
     assert drawn.band_hz == drawn_hz
     np.testing.assert_allclose(drawn.before[inside], 0.5 * (drawn_hz[0] == 0.0) + share * push[inside], atol=0.05)
@@ -99,7 +99,7 @@ def test_signal_holds_what_is_in_the_band_that_it_states(band_hz, push_hz, drawn
 def test_signal_keeps_to_its_own_band_where_the_map_lacks_another_below_2_hz(channel, band_hz):
     """As of rates, whose lowest band alone is judged, and of commands, whose lowest is not: the floor is known."""
     own = cell(channel, "hover", 0.5, 0.2, band_hz=band_hz)
-    drawn = pictures(flight(SECONDS), cells=[own], whole_map=[own]).signal
+    drawn = curves_with(flight(SECONDS), cells=[own], whole_map=[own]).signal
     assert drawn.band_hz == band_hz and (drawn.floor == 0.2).all()
 
 
@@ -108,14 +108,15 @@ def test_height_is_drawn_beside_a_ground_effect_alone_and_where_it_is_known():
     low = replace(flown, signals=flown.signals.copy(), usable=TIME_S < 10.0)
     low.signals[:, at.HEIGHT] = 0.08
     effect = terms("ground_effect")[0].fitted(np.ones(1))
-    np.testing.assert_array_equal(pictures(low, effects=[effect]).signal.height_m, np.where(low.usable, 0.08, np.nan))
-    assert pictures(low, effects=[bias(0.4)]).signal.height_m is None
+    height_m = curves_with(low, effects=[effect]).signal.height_m
+    np.testing.assert_array_equal(height_m, np.where(low.usable, 0.08, np.nan))
+    assert curves_with(low, effects=[bias(0.4)]).signal.height_m is None
     low.signals[:, at.HEIGHT] = 0.0
-    assert pictures(low, effects=[effect]).signal.height_m is None
+    assert curves_with(low, effects=[effect]).signal.height_m is None
 
 
 def test_nothing_is_drawn_where_nothing_is_judged():
-    drawn = pictures(replace(whole_flight := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
+    drawn = curves_with(replace(whole_flight := flight(SECONDS, FORWARD), usable=(used := TIME_S < 10.0)))
     assert whole_flight.usable.all()
     np.testing.assert_array_equal(np.isfinite(drawn.signal.before), used)
     np.testing.assert_array_equal(np.isfinite(drawn.signal.measured), used)
@@ -127,7 +128,7 @@ def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz, constan
     """A constant gap, with 50 m/s^2 in the rows that stand for those that were lost."""
     lost = (TIME_S >= 7.0) & (TIME_S < 7.1)
     lossy_flight = flight(SECONDS, np.where(lost[:, None], 50.0, FORWARD), lost=lost)
-    drawn = pictures(lossy_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
+    drawn = curves_with(lossy_flight, cells=[cell("force_x", "hover", 0.5, band_hz=band_hz)]).signal
     for curve in (drawn.before, drawn.measured):
         assert np.isnan(curve[lost]).all()
         np.testing.assert_allclose(curve[~lost], constant, atol=1e-9)
@@ -137,24 +138,24 @@ def test_flight_of_the_signal_is_that_of_the_median_gap():
     """By the standard deviation in the cell's channel; in another channel their order is another."""
     noisy_flights = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
             for i, (forward, up) in enumerate([(3.0, 1.0), (1.0, 2.0), (2.0, 3.0)])]
-    assert pictures(*noisy_flights).signal.flight == "2.0"
-    assert pictures(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
+    assert curves_with(*noisy_flights).signal.flight == "2.0"
+    assert curves_with(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
 
 
 def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
     """The third of three gaps, where the effect acts in this flight alone; without one that passes it is the second."""
     flights = [flight(SECONDS, noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((1.0, 2.0, 3.0))]
     passing = replace(bias(0.4), gate=(("3.0", 2.0, 4.0),))
-    drawn = pictures(*flights, effects=[passing]).signal
+    drawn = curves_with(*flights, effects=[passing]).signal
     assert (drawn.flight, drawn.acts_s) == ("3.0", ((2.0, 4.0),))
-    assert pictures(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
+    assert curves_with(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
 
 
 def test_an_effect_that_changes_no_sample_has_no_curve_after():
     """A bias of 0 and one of 0.4 m/s^2."""
     pushed = flight(SECONDS, FORWARD)
-    assert pictures(pushed, effects=[bias(0.0)]).signal.after is None
-    assert pictures(pushed, effects=[bias(0.4)]).signal.after is not None
+    assert curves_with(pushed, effects=[bias(0.0)]).signal.after is None
+    assert curves_with(pushed, effects=[bias(0.4)]).signal.after is not None
 
 
 def test_flight_without_the_channel_does_not_count_for_the_median():
@@ -162,8 +163,8 @@ def test_flight_without_the_channel_does_not_count_for_the_median():
     turning = [flight(SECONDS, gyro=noise(SECONDS, rms, i), name=str(rms)) for i, rms in enumerate((0.3, 0.1, 0.2))]
     without_gyro = [replace(flight(SECONDS, name=f"no gyro {i}"), rates=None) for i in range(2)]
     rate = [cell("rate_x", "hover", 1.0)]
-    assert pictures(*turning, *without_gyro, cells=rate).signal.flight == "0.2"
-    assert pictures(*without_gyro, cells=rate).signal is None
+    assert curves_with(*turning, *without_gyro, cells=rate).signal.flight == "0.2"
+    assert curves_with(*without_gyro, cells=rate).signal is None
 
 
 @pytest.mark.parametrize(("channel", "gyro", "shown"), [
@@ -173,7 +174,7 @@ def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):
     turning_flight = flight(SECONDS, gyro=0.0 if gyro is None else noise(SECONDS, gyro, 5))
     if gyro is None:
         turning_flight = replace(turning_flight, rates=None)
-    drawn = pictures(turning_flight, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
+    drawn = curves_with(turning_flight, cells=[cell(channel, "hover", 1.0, band_hz=(12.0, 25.0))]).signal
     assert (drawn.measured is not None) is shown
     if shown:
         band = butter(4, (12.0, 25.0), "bandpass", fs=1.0 / PERIOD_S, output="sos")
@@ -183,7 +184,7 @@ def test_measured_is_drawn_of_what_a_sensor_shows_alone(channel, gyro, shown):
 
 def test_spectra_are_of_the_cells_channels_each_once_and_the_first_few():
     channels = ["force_z", "force_x", "force_z", "torque_x", "force_y"]
-    curves = pictures(hover(1, length_s=SECONDS), cells=[cell(c, "hover", 1.0) for c in channels])
+    curves = curves_with(hover(1, length_s=SECONDS), cells=[cell(c, "hover", 1.0) for c in channels])
     assert [s.channel for s in curves.spectra] == ["force_z", "force_x", "torque_x"] and MOST_SPECTRA == 3
     assert [s.unit for s in curves.spectra] == ["m/s^2", "m/s^2", "rad/s^2"]
     np.testing.assert_array_equal(curves.frequency_hz, frequencies(AIR))
@@ -194,7 +195,7 @@ def test_spectra_are_of_the_cells_channels_each_once_and_the_first_few():
 def test_spectrum_before_is_the_mean_power_of_white_noise():
     """2 rms^2 T, one-sided, over blocks of several flights."""
     noisy_flights = [flight(60.0, noise(60.0, rms, 20 + i)) for i, rms in enumerate((0.1, 0.3))]
-    (spectrum,) = pictures(*noisy_flights).spectra
+    (spectrum,) = curves_with(*noisy_flights).spectra
     assert spectrum.before[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * np.mean([0.1 ** 2, 0.3 ** 2]), rel=0.05)
 
 
@@ -205,7 +206,7 @@ def test_floor_of_a_spectrum_is_the_nominal_power_where_nine_blocks_are_known_an
     seconds = {8: 11.6, 9: 12.9}[blocks]
     nominal = flight(seconds, noise(seconds, 0.5, 7))
     assert len(starts(nominal, AIR)) == blocks
-    (spectrum,) = pictures(hover(1, length_s=SECONDS), nominal=[nominal]).spectra
+    (spectrum,) = curves_with(hover(1, length_s=SECONDS), nominal=[nominal]).spectra
     rms = 0.5 if measured else sensor_noise(VEHICLE)[COLUMN["force_x"]]
     assert spectrum.floor[2:-1].mean() == pytest.approx(2.0 * PERIOD_S * rms ** 2, rel=0.25)
 
@@ -216,7 +217,7 @@ def test_spectra_of_a_nominal_flight_lie_at_their_floor():
     study = declared_study(VEHICLE, nominal)
     assert study.response is not None
     for channel in CHANNELS:
-        (spectrum,) = pictures(other, nominal=nominal, study=study, cells=[cell(channel.name, "hover", 1.0)]).spectra
+        (spectrum,) = curves_with(other, nominal=nominal, study=study, cells=[cell(channel.name, "hover", 1.0)]).spectra
         for low, high in ((2.0, 6.0), (6.0, 12.0), (12.0, 25.0)):
             band = (frequencies(AIR) >= low) & (frequencies(AIR) < high)
             assert 0.5 < spectrum.before[band].mean() / spectrum.floor[band].mean() < 2.0, (channel.name, low)
@@ -226,14 +227,14 @@ def test_a_command_has_the_floor_of_nominal_flights_and_none_without_them(monkey
     """The noise of the sensors, which stands for them, is not in a command. Its power here is 2 T."""
     monkeypatch.setattr(Study, "residual", lambda *_: np.random.default_rng(0).normal(size=(len(TIME_S), COUNT)))
     flown, cells = hover(1, length_s=SECONDS), [cell(name, "hover", 1.0) for name in ("force_x", "command_yaw")]
-    force, command = pictures(flown, cells=cells).spectra
+    force, command = curves_with(flown, cells=cells).spectra
     assert force.floor is not None and command.channel == "command_yaw" and command.floor is None
-    _, command = pictures(flown, cells=cells, nominal=[flown]).spectra
+    _, command = curves_with(flown, cells=cells, nominal=[flown]).spectra
     assert command.floor[2:-1].mean() == pytest.approx(2.0 * PERIOD_S, rel=0.25)
 
 
 def test_spectrum_after_lacks_the_power_of_a_mean_effect():
-    (spectrum,) = pictures(flight(SECONDS, FORWARD), effects=[bias(0.5)]).spectra
+    (spectrum,) = curves_with(flight(SECONDS, FORWARD), effects=[bias(0.5)]).spectra
     assert spectrum.before[0] > 0.1 and spectrum.after.max() < 1e-9
 
 
@@ -242,13 +243,13 @@ def test_spectrum_after_a_random_effect_is_near_the_floor():
     louder = terms("imu_noise")[0].fitted(np.ones(1))
     factor = louder.values["factor"]
     noisy_flight = hover(1, louder=np.sqrt(1.0 + (factor ** 2 - 1.0) / LOUDNESS ** 2), length_s=120.0)
-    curves = pictures(noisy_flight, effects=[louder], nominal=[hover(2, length_s=120.0)])
+    curves = curves_with(noisy_flight, effects=[louder], nominal=[hover(2, length_s=120.0)])
     (spectrum,) = curves.spectra
     above = slice(2, -1)
     assert spectrum.before[above].mean() > 1.5 * spectrum.floor[above].mean()
     off = np.abs(spectrum.after - spectrum.floor)[above].mean()
     assert off < 0.3 * (spectrum.before - spectrum.floor)[above].mean()
-    assert curves.random and not pictures(noisy_flight, effects=[bias(0.4)]).random
+    assert curves.random and not curves_with(noisy_flight, effects=[bias(0.4)]).random
 
 
 @pytest.mark.parametrize("name", ["imu_noise", "motor_noise"])
@@ -260,8 +261,8 @@ def test_torque_after_noise_is_near_the_floor(name):
     nominal, (louder, *_) = fly(4, 5), [t.fitted(np.ones(1)) for t in terms(name)]
     noisy_flights = fly(3, 11, [(name, dict(louder.values))])
     for axis in "xyz":
-        (spectrum,) = pictures(*noisy_flights, nominal=nominal, study=declared_study(VEHICLE, nominal),
-                               effects=[louder], cells=[cell(f"torque_{axis}", "hover", 1.0)]).spectra
+        (spectrum,) = curves_with(*noisy_flights, nominal=nominal, study=declared_study(VEHICLE, nominal),
+                                  effects=[louder], cells=[cell(f"torque_{axis}", "hover", 1.0)]).spectra
         for low, high in ((2.0, 4.5), (4.5, 7.0), (7.0, 12.0), (12.0, 25.0)):
             band = (frequencies(AIR) >= low) & (frequencies(AIR) < high)
             before, after = (p[band].mean() / spectrum.floor[band].mean() for p in (spectrum.before, spectrum.after))
@@ -272,7 +273,7 @@ def test_lost_rows_add_nothing_to_a_spectrum_that_is_drawn():
     """A constant gap has no power above the means, whatever rows are lost."""
     lost = np.arange(1500) % 100 < 3
     whole, poor = (flight(15.0, FORWARD, lost=rows) for rows in (None, lost))
-    power, poorer = (pictures(f).spectra[0].before for f in (whole, poor))
+    power, poorer = (curves_with(f).spectra[0].before for f in (whole, poor))
     assert poorer == pytest.approx(power, abs=1e-9) and power[3:].max() < 1e-9
 
 
@@ -281,33 +282,33 @@ def test_a_spectrum_is_the_mean_over_the_flights_that_have_its_sensor():
     one, two, three = (hover(seed, length_s=SECONDS) for seed in (1, 2, 3))
     flown, effects = (one, replace(two, rates=None), three), [terms("imu_noise")[0].fitted(np.ones(1))]
     cells = [cell(channel, "hover", 1.0) for channel in ("force_z", "rate_x")]
-    force, turning = pictures(*flown, cells=cells, effects=effects).spectra
+    force, turning = curves_with(*flown, cells=cells, effects=effects).spectra
     assert (force.channel, turning.channel) == ("force_z", "rate_x")
-    expected = pictures(one, three, cells=cells, effects=effects).spectra[1]
+    expected = curves_with(one, three, cells=cells, effects=effects).spectra[1]
     np.testing.assert_allclose(turning.before, expected.before)
     np.testing.assert_allclose(turning.after, expected.after)
-    np.testing.assert_allclose(force.before, pictures(one, two, three, cells=cells).spectra[0].before)
+    np.testing.assert_allclose(force.before, curves_with(one, two, three, cells=cells).spectra[0].before)
 
 
 def test_without_a_cell_the_commands_are_all():
-    curves = pictures(flight(SECONDS), cells=[])
+    curves = curves_with(flight(SECONDS), cells=[])
     assert curves.signal is None and curves.spectra == () and not len(curves.frequency_hz)
     assert curves.commands is not None
 
 
 def test_commands_of_nominal_flights_are_drawn_where_there_are_any():
-    alone = pictures(flight(SECONDS)).commands
-    beside = pictures(flight(SECONDS), nominal=[flight(SECONDS)]).commands
+    alone = curves_with(flight(SECONDS)).commands
+    beside = curves_with(flight(SECONDS), nominal=[flight(SECONDS)]).commands
     assert set(alone.flown) == set(beside.flown) == set(beside.nominal) and not alone.nominal
     for axis, power in beside.flown.items():
         np.testing.assert_array_equal(power, beside.nominal[axis])
 
 
 def test_without_flights_nothing_is_drawn():
-    curves = pictures()
+    curves = curves_with()
     assert curves.signal is None and curves.spectra == () and curves.commands is None
 
 
 def test_a_flight_too_short_for_a_block_has_a_signal_and_no_spectrum():
-    curves = pictures(flight(1.0, FORWARD))
+    curves = curves_with(flight(1.0, FORWARD))
     assert curves.signal is not None and curves.spectra == ()

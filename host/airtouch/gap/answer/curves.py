@@ -85,7 +85,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True)
-class Pictures:
+class Curves:
     """Every curve of a report.
 
     signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
@@ -100,8 +100,8 @@ class Pictures:
     random: bool = False
 
 
-def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
-                cells: Sequence[Cell], whole_map: Sequence[Cell]) -> Pictures:
+def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
+              cells: Sequence[Cell], whole_map: Sequence[Cell]) -> Curves:
     """The curves of a diagnosis.
 
     cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
@@ -109,7 +109,7 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
     if not cells or not flights:
-        return Pictures(commands=commands)
+        return Curves(commands=commands)
     active = [t.active() for t in mean_of(effects)]
     residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
             for f in flights[:MOST_FLIGHTS]]
@@ -117,8 +117,8 @@ def pictures_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Fligh
     gated = {name for t in effects for name, *_ in t.gate}  # flights in which a passing effect acts
     median = _median_residual([r for r in residuals if r.flight.name in gated] or residuals, cells[0].channel)
     signal = None if median is None else _signal(median, cells[0], whole_map, effects)
-    return Pictures(signal, frequencies(AIR),
-                    _spectra(study, residuals, nominal, effects, channels), commands, bool(random_of(effects)))
+    return Curves(signal, frequencies(AIR), _spectra(study, residuals, nominal, effects, channels), commands,
+                  bool(random_of(effects)))
 
 
 def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell], effects: Sequence[Term]) -> Signal:
