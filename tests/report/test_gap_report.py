@@ -92,6 +92,16 @@ def test_only_phases_that_are_drawn_are_explained(pushed_flights, tmp_path):
     assert "Blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
 
 
+def test_a_floor_of_the_spectra_is_explained_where_one_is_drawn(pushed_flights, tmp_path):
+    result = of_flights(pushed_flights[:1])
+    bare = replace(result.curves, spectra=tuple(replace(s, floor=None) for s in result.curves.spectra))
+    for one, explained in ((result, True), (replace(result, curves=bare), False)):
+        gap_report.write_diagnosis(tmp_path / "gap.html", one, command="x", force=True)
+        text, _ = checked(tmp_path / "gap.html")
+        assert ("Floor: the same of the baseline flights" in text) is explained
+        assert "The lowest frequency holds" in text
+
+
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):
     path, result = tmp_path / "gap.html", of_flights(pushed_flights)
     gap_report.write_diagnosis(path, result, command="x")

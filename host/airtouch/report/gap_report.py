@@ -182,8 +182,10 @@ def _plots(curves: Curves | None) -> list[Plot]:
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
-        text = (f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. The lowest frequency holds a part "
-                "of a constant gap.")
+        text = f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. "
+        if any(spectrum.floor is not None for spectrum in curves.spectra):
+            text += "Floor: the same of the baseline flights; with few or none, the noise of the sensors. "
+        text += "The lowest frequency holds a part of a constant gap."
         if curves.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
                      "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
