@@ -53,13 +53,15 @@ def test_a_flight_without_an_edge_says_so(tmp_path):
     assert result.exit_code == 0 and result.output.splitlines()[-2] == "no edges found in the down range"
 
 
-def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path):
+@pytest.mark.parametrize(("ending", "first"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF-")])
+def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path, ending, first):
     """Both have a file: written to one name, the picture would replace the GeoJSON without a word."""
     logs.write(zigzag_log(), tmp_path / "zigzag.csv")
-    result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / "plane.png")
+    result = run(tmp_path / "zigzag.csv", "--truth", "--out", tmp_path / f"plane.{ending}")
     assert result.exit_code == 0, result.output
     assert json.loads((tmp_path / "plane.geojson").read_text())["features"]
-    assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / f"plane.{ending}").read_bytes().startswith(first)
+    assert {p.name for p in tmp_path.iterdir()} == {"zigzag.csv", "plane.geojson", f"plane.{ending}"}
 
 
 def test_edges_at_which_the_position_is_lost_are_counted(tmp_path):

@@ -13,6 +13,8 @@ from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 from airtouch.logs.formats.rosbag import is_bag
 
+PICTURES = (".png", ".svg", ".pdf")  #: endings of a plot
+
 
 @click.command(name="map")
 @click.argument("flight", type=click.Path(path_type=Path))
@@ -26,7 +28,8 @@ from airtouch.logs.formats.rosbag import is_bag
 @click.option("--sigma", type=Finite(0, 5, min_open=True), metavar="S",
               help="Timing error of a detection; that of the model, or 0.1 s, if left out.")
 @click.option("--out", type=click.Path(path_type=Path),
-              help="GeoJSON to write, of any ending; the plot goes beside it as .png.")
+              help="GeoJSON to write, of any ending; the plot goes beside it as .png. Or the plot, as .png, .svg or "
+                   ".pdf; the GeoJSON goes beside it.")
 @click.option("--force", is_flag=True, help="Replace both.")
 def command(flight: Path, detector: str, model: Path | None, truth: bool, speed: float | None, heading: float,
             sigma: float | None, out: Path | None, force: bool) -> None:
@@ -44,8 +47,8 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     from airtouch.detector.evaluation.evaluate import remarks
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
-    out = out.with_suffix(".geojson") if out.suffix == ".png" else out
-    picture = out.with_suffix(".png")
+    picture = out if out.suffix in PICTURES else out.with_suffix(".png")
+    out = out.with_suffix(".geojson") if out == picture else out
     for path in (out, picture):
         check_free(path, force)
     if flight.is_dir() and not is_bag(flight):
