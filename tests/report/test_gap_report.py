@@ -102,6 +102,17 @@ def test_a_floor_of_the_spectra_is_explained_where_one_is_drawn(pushed_flights, 
         assert "The lowest frequency holds" in text
 
 
+def test_no_plot_of_an_earlier_result_stays_among_those_that_replace_it(pushed_flights, tmp_path):
+    curves = of_flights(pushed_flights[:1]).curves
+    (tmp_path / "signal_of_mine.svg").touch()
+    assert len(gap_report.write_plots(tmp_path, curves)) == 6
+    with pytest.raises(AirTouchError, match="--force"):
+        gap_report.write_plots(tmp_path, curves)
+    files = gap_report.write_plots(tmp_path, replace(curves, signal=None, spectra=()), force=True)
+    names = {"commands.svg", "commands.pdf"}
+    assert {f.name for f in files} == names and {f.name for f in tmp_path.iterdir()} == names | {"signal_of_mine.svg"}
+
+
 def test_no_text_stands_twice_and_the_headlines_cell_is_marked_once(pushed_flights, tmp_path):
     path, result = tmp_path / "gap.html", of_flights(pushed_flights)
     gap_report.write_diagnosis(path, result, command="x")

@@ -138,16 +138,18 @@ def plot_files(folder: Path) -> list[Path]:
 def write_plots(folder: Path, curves: Curves | None, force: bool = False) -> list[Path]:
     """Write the plots of the page to a folder, each as SVG and PDF, and return the files; needs matplotlib.
 
-    Raises AirTouchError for a file that exists, without `force`.
+    Raises AirTouchError for a file that exists, without `force`; with it, one of a plot that there is not is removed.
     """
     from airtouch.report.style import write_image
 
     make_folder(folder)
     drawn = figures(curves)
-    files = [file for file in plot_files(folder) if file.stem in drawn]
-    for file in files:
-        write_image(drawn[file.stem], file, force)
-    return files
+    for file in plot_files(folder):
+        if file.stem in drawn:
+            write_image(drawn[file.stem], file, force)
+        elif force:
+            file.unlink(missing_ok=True)
+    return [file for file in plot_files(folder) if file.stem in drawn]
 
 
 def _images(curves: Curves | None) -> list[dict[str, str]]:
