@@ -50,7 +50,7 @@ def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: R
     if room:
         subplots = {"sharex": True, "gridspec_kw": _grid(size_in, rows, columns, room), **subplots}
     axes = figure.subplots(rows, columns, squeeze=False, **subplots)
-    for ax in axes.flat:  # ticks are made when the figure is saved, by then without the style
+    for ax in axes.flat:  # as many ticks as fit are made when the figure is saved, by then without the style
         ax.tick_params(which="both", labelsize=matplotlib.rcParams["font.size"])
     return figure, axes
 
