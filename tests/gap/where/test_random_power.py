@@ -1,4 +1,7 @@
-"""Power that random effects add to block sums: in closed form, and against simulated pairs of flights of one seed."""
+"""Power that random effects add to block sums, and what the map has left of it with them in the model.
+
+In closed form, and against simulated pairs of flights of one seed, with the effect and without it.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -13,6 +16,7 @@ from airtouch.gap.signals.channels import FORCE, TORQUE
 from airtouch.gap.signatures.candidates import mean_of, random_of, random_part_of, terms
 from airtouch.gap.where.band_sums import block_sums
 from airtouch.gap.where.filter_bank import sensor_rms
+from airtouch.gap.where.gap_map import gap_map
 from airtouch.gap.where.random_power import random_power
 from airtouch.logs.segments import KINDS
 from gap_flights import HOVER, VEHICLE, flight, fly, study
@@ -141,3 +145,54 @@ def test_a_passing_effect_adds_its_power_in_its_seconds_alone():
     whole, part = (random_power(study(), made, [replace(noise, gate=g)])[:, 0, 5, 0].sum()
                    for g in ((), (("shaken", 5.0, 9.0), ("another", 0.0, 20.0))))
     assert part == pytest.approx(0.2 * whole) and len(sums.phase) > 5
+
+
+def squares_of_map(flights, parts=()):
+    """Mean squares (cells,) of the map's force and torque in the air, without the parts (gap) and with them (after)."""
+    cells = [c for c in gap_map(nominal_study(), flights, terms=parts).cells
+             if c.regime == "all" and c.phase in ("hover", "cruise") and c.channel.startswith(("force", "torque"))]
+    return np.array([c.gap for c in cells]) ** 2, np.array([c.after if parts else np.nan for c in cells]) ** 2
+
+
+def of_times_the_power(name, values, key, times):
+    """The terms of an effect whose random part has so many times the power of the effect with these values.
+
+    key: of the value that is its strength. Also the values of the effect that is simulated.
+    """
+    root = np.sqrt(times)
+    if key == "turbulence":
+        _, flown = with_turbulence(name, **values)
+        return with_turbulence(name, **{**values, key: root * values[key]})[0], flown
+    louder = root * values[key] if key != "factor" else np.sqrt(1.0 + times * (values[key] ** 2 - 1.0))
+    part = with_values(name, **values)
+    return [replace(part, values={**part.values, key: louder})], dict(part.values)
+
+
+RANDOM = pytest.mark.parametrize(("name", "values", "key"), [
+    ("downwash", {"strength": 0.1, "turbulence": 0.6, "width": 0.0}, "turbulence"),
+    ("gust", {"length": 0.5, "rms": 0.3}, "rms"), ("motor_noise", {"time": 0.005, "rms": 0.1}, "rms"),
+    ("motor_noise", {"time": 0.1, "rms": 0.05}, "rms"), ("imu_noise", {"factor": 2.0}, "factor")])
+
+
+@RANDOM
+def test_with_the_true_effect_the_map_of_a_flight_is_that_of_the_flight_without_it(name, values, key):
+    """In the cells that the effect moves by half or more the chance of the effect's power is no gap."""
+    parts, flown = of_times_the_power(name, values, key, 1.0)
+    pairs = [(squares_of_map([without])[0], *squares_of_map([shaken], parts))
+             for without, shaken in zip(calm(), fly(FLIGHTS, 7, [(name, flown)]), strict=True)]
+    of_calm, before, after = (np.sqrt(x) for x in np.array(pairs).swapaxes(0, 1))
+    moved = (before / of_calm).mean(axis=0) > 1.5
+    assert moved.sum() >= 8, "forces or torques, in hover and cruise"
+    assert np.median((after / of_calm)[:, moved]) == pytest.approx(1.0, abs=LOOP_ERROR)
+
+
+@RANDOM
+@pytest.mark.parametrize(("times", "share"), [(0.5, 0.5), (1.0, 0.0), (2.0, 1.0)])
+def test_of_a_wrong_power_the_map_has_the_difference_left(name, values, key, times, share):
+    """Of half the power half is left, and of twice the power as much too much as there is."""
+    parts, flown = of_times_the_power(name, values, key, times)
+    before, after = squares_of_map(fly(FLIGHTS, 7, [(name, flown)]), parts)
+    of_calm, _ = squares_of_map(calm())
+    moved = before > 1.5 ** 2 * of_calm
+    left = (after - of_calm)[moved] / (before - of_calm)[moved]
+    assert np.median(left) == pytest.approx(share, abs=LOOP_ERROR)

@@ -8,21 +8,20 @@ flights), and never narrower than the time-bandwidth product of the cell allows.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.signals.channels import CHANNELS, COMMAND, COUNT, RATE
-from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 from airtouch.gap.where.band_sums import Sums, block_sums, join
 from airtouch.gap.where.cell import BASELINE, SMALLEST_FLOOR, SPREAD, Cell, GapMap
 from airtouch.gap.where.cell_tables import LEAST_SECONDS, Table, floors_of, phase_floor, spreads_of, table_of
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, sensor_rms
-from airtouch.gap.where.random_power import random_power
+from airtouch.gap.where.random_power import SumsWith, join_with, sums_with
 from airtouch.gap.where.regimes import REGIMES
 from airtouch.logs.segments import KINDS
 
@@ -35,8 +34,8 @@ class Part:
 
     name: str
     before: Sums
-    after: Sums | None
-    alone: tuple[Sums, ...] = ()  #: sums with one of the effects in the model each, where there are several
+    after: SumsWith | None
+    alone: tuple[SumsWith, ...] = ()  #: sums with one of the effects in the model each, where there are several
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,8 @@ class MapSums:
     """
 
     before: Sums
-    after: Sums | None
-    alone: Sequence[Sums]
+    after: SumsWith | None
+    alone: Sequence[SumsWith]
     effects: Sequence[str]
 
 
@@ -56,13 +55,13 @@ class MapSums:
 class PhaseTables:
     """The tables of one phase, of which its cells are made.
 
-    kind: name of the phase; after: with the named effects in the model; floor, floor_high (regimes, bands, COUNT):
+    kind: name of the phase; after, floor, floor_high (regimes, bands, COUNT): rms with the named effects in the model,
     floor and its upper end, in the channels' units; best: name of the effect that takes most from each cell, or "".
     """
 
     kind: str
     table: Table
-    after: Table | None
+    after: np.ndarray | None
     floor: np.ndarray
     floor_high: np.ndarray
     best: np.ndarray | None
@@ -82,9 +81,9 @@ def gap_map(study: Study, flights: Iterable[Flight], baseline: Iterable[Flight] 
 def part_of(study: Study, flight: Flight, terms: Sequence[Term] = ()) -> Part:
     """One flight's part of the map under a study, and with the terms' effects in the model."""
     gap = study.residual(flight)
-    after, groups = _sums_with(study, flight, terms) if terms else None, _effects(terms)
+    after, groups = sums_with(study, flight, terms) if terms else None, _effects(terms)
     return Part(flight.name, block_sums(flight, gap, study.vehicle), after,
-                tuple(_sums_with(study, flight, group) for group in groups) if len(groups) > 1 else ())
+                tuple(sums_with(study, flight, group) for group in groups) if len(groups) > 1 else ())
 
 
 def _effects(terms: Sequence[Term]) -> list[list[Term]]:
@@ -98,30 +97,15 @@ def assemble(study: Study, parts: Sequence[Part], nominal: Sequence[Part] = (),
     joined, sensor = join([p.before for p in parts]), sensor_rms(study.vehicle)
     floors = floors_of(join([p.before for p in nominal]), sensor) if nominal \
         else spreads_of(joined, sensor)
-    after = join([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
-    alone = ([join([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
+    after = join_with([p.after for p in parts if p.after]) if parts and all(p.after for p in parts) else None
+    alone = ([join_with([p.alone[i] for p in parts]) for i in range(len(effects))] if len(effects) > 1
              else [after] if after is not None else [])
     map_sums, cells = MapSums(joined, after, alone, effects), []
     for phase in range(len(KINDS)):
-        tables = _phase_tables(phase, map_sums, phase_floor(floors, phase))
+        tables = _phase_tables(phase, map_sums, phase_floor(floors, phase), sensor)
         if tables is not None:
             cells += _cells(tables, visible(phase, bool(nominal)))
     return GapMap(tuple(cells), BASELINE if nominal else SPREAD, tuple(p.name for p in parts))
-
-
-def _sums_with(study: Study, flight: Flight, terms: Sequence[Term]) -> Sums:
-    """A flight's block sums with effects in the model.
-
-    The power of random effects, whose samples nobody can predict, is subtracted; power that they have too much counts
-    as gap.
-    """
-    gap = block_sums(flight, study.residual(flight, [t.active() for t in mean_of(terms)]), study.vehicle)
-    random = random_of(terms)
-    if not random or not len(gap.phase):
-        return gap
-    sensor = sensor_rms(study.vehicle) ** 2
-    noise = np.minimum(sensor * gap.weight[:, :, None, None], gap.power)
-    return replace(gap, power=noise + np.abs(gap.power - noise - random_power(study, flight, random)))
 
 
 def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.ndarray,
@@ -133,15 +117,19 @@ def _best_effect(alone: Sequence[np.ndarray], effects: Sequence[str], gap: np.nd
     return np.where((reduction.max(axis=0) > LEAST_SHARE) & (gap > floor), best, "")
 
 
-def _phase_tables(phase: int, of_map: MapSums, floor: tuple[np.ndarray, np.ndarray]) -> PhaseTables | None:
-    """The tables of a phase, None where no flight has it. floor: and its upper end, (regimes, bands, COUNT) each."""
+def _phase_tables(phase: int, of_map: MapSums, floor: tuple[np.ndarray, np.ndarray], sensor: np.ndarray,
+                  ) -> PhaseTables | None:
+    """The tables of a phase, None where no flight has it.
+
+    floor: and its upper end, (regimes, bands, COUNT) each; sensor: `sensor_rms`.
+    """
     table = table_of(of_map.before, phase, seed=phase)
     if table is None:
         return None
-    table_after = table_of(of_map.after, phase, seed=phase) if of_map.after is not None else None
-    alone = [np.sqrt(a.of_phase(phase).mean_square()) for a in of_map.alone]
-    best = _best_effect(alone, of_map.effects, table.rms, floor[0]) if table_after else None
-    return PhaseTables(KINDS[phase], table, table_after, *floor, best)
+    if of_map.after is None:
+        return PhaseTables(KINDS[phase], table, None, *floor, None)
+    after, *alone = (np.sqrt(s.of_phase(phase).mean_square(sensor ** 2)) for s in (of_map.after, *of_map.alone))
+    return PhaseTables(KINDS[phase], table, after, *floor, _best_effect(alone, of_map.effects, table.rms, floor[0]))
 
 
 def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
@@ -153,7 +141,7 @@ def _cells(phase: PhaseTables, shown: np.ndarray) -> list[Cell]:
             channel=CHANNELS[c].name, band_hz=MAP_BANDS_HZ[b], phase=phase.kind, gap=float(table.rms[r, b, c]),
             floor=float(phase.floor[r, b, c]), unit=CHANNELS[c].unit, low=float(table.low[r, b, c]),
             high=float(table.high[r, b, c]), regime=REGIMES[r], blocks=int(table.blocks[r, b, c]),
-            flights=int(table.flights[r, b, c]), after=None if after is None else float(after.rms[r, b, c]),
+            flights=int(table.flights[r, b, c]), after=None if after is None else float(after[r, b, c]),
             floor_high=float(phase.floor_high[r, b, c]),
             by=None if phase.best is None else phase.best[r, b, c] or None))
     return cells
