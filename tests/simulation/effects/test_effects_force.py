@@ -76,6 +76,18 @@ def test_ground_effect_turbulence_has_its_rms(signals):
     assert rough.std() / calm == pytest.approx(0.3 / 2, rel=0.1)  # four rotors, each on its own
 
 
+def test_joint_lift_does_not_amplify_the_moments_of_the_motors(signals):
+    """At equal heights the lift g of each rotor is alike: it adds g times the motors' moment, or with joint 1 none."""
+    signals[:, at.LOWER_HEIGHT:at.LOWER_HEIGHT + 4] = 0.05
+    signals[:, at.THRUST:at.THRUST + 4] = (0.05, 0.08, 0.11, 0.10)
+    own, half, joint = (wrench("ground_effect", {"turbulence": 0.0, "joint": x}, signals)[0] for x in (0.0, 0.5, 1.0))
+    assert [half[2], joint[2]] == pytest.approx([own[2]] * 2)
+    thrust, y = signals[0, at.THRUST:at.THRUST + 4], signals[0, at.ROTOR_Y:at.ROTOR_Y + 4]
+    assert own[3] == pytest.approx(own[2] / thrust.sum() * (y @ thrust)) and abs(own[3]) > 1e-5
+    assert [half[3], half[4]] == pytest.approx([0.5 * own[3], 0.5 * own[4]])
+    assert joint[3:5] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_modes_of_the_turbulence_have_their_shares(signals):
     """heave and pitch scale total force and pitching torque, roll stays; swirl is yaw torque over lift."""
     signals = np.repeat(signals[:1], 5000, axis=0)

@@ -124,7 +124,9 @@ def _each(parameter: str, *values: float) -> tuple[Mapping[str, float], ...]:
 #: apart, so that a fit between two of them loses little
 SIGNATURES: dict[str, Signature] = {
     "ground_effect": Signature(
-        ("strength",), variants=_each("fade", 0.0, 0.06, 0.0875, 0.129),
+        # each rotor on its own, or all together: recorded flights show less torque than the former
+        ("strength",), variants=tuple({"fade": fade, "even": together, "joint": together}
+                                      for together in (0.0, 1.0) for fade in (0.0, 0.06, 0.0875, 0.129)),
         shape=Shape("fade", (0.06, 0.0875, 0.105, 0.129, 0.16, 0.22, 0.0)), without_random={"turbulence": 0.0},
         at_edges=True,
         # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of

@@ -8,7 +8,8 @@ from airtouch.simulation.flight import prepare
 from tools.diagnosis.recordings import swarm_lift
 
 NAMED = {"strength": 0.8, "fountain": 2.0, "fade": 0.1, "turbulence": 0.5, "turbulence_time": 0.1, "heave": 1.0,
-         "pitch": 1.0, "swirl": 0.0, "even": 0.0, "leaving": 0.0}
+         "pitch": 1.0, "swirl": 0.0, "even": 0.0, "leaving": 0.0,
+         "joint": 0.0}
 
 
 def test_the_lift_is_that_of_the_published_equation():
