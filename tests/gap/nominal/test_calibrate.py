@@ -99,7 +99,7 @@ def with_noisy_commands(flight, rms_pwm, rows, seed):
 
 @pytest.mark.parametrize("at_rest", [True, False])
 def test_thrust_is_right_where_logged_commands_are_noisy(nominal, at_rest):
-    """Regression dilution: noise of 4000 PWM makes the slope of lift over thrust a fifth too small, and a bias fills in.
+    """Regression dilution: noise of 4000 PWM makes the slope of lift over thrust a fifth too small; a bias fills in.
 
     The truth is the simulator's vehicle, which is the declared one, without a bias.
     """
