@@ -138,7 +138,7 @@ EFFECT = Effect(
      Parameter("joint", "1", 0.0, 0.0, 1.0, None,
                "how far the mean lift of each rotor follows the thrust of all, not its own; 1: a moment of the motors "
                "is not amplified near a surface",
-               "`tools/diagnosis/gap_lift.py --by-channel`: neural-swarm's roll torque of 2 to 6 Hz shows less of it than "
+               "`tools/diagnosis/gap_lift.py --by-channel`: neural-swarm's roll torque of 2 to 6 Hz shows less than "
                "their lift")),
     wrench=ground_effect,
     presets={
