@@ -1,11 +1,16 @@
 """What commands and the scripts of tools share: a progress bar, the folder of recorded flights, options."""
 
+import gc
+import importlib
+import weakref
+
 import click
 import pytest
 from click.testing import CliRunner
 
 from airtouch.cli import airtouch
 from airtouch.cli.shared import flights
+from airtouch.cli.shared.modules import loaded_for_good
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError
 
@@ -69,3 +74,22 @@ def test_a_bar_is_no_part_of_the_answer(arguments, tmp_path, monkeypatch):
     result = CliRunner().invoke(airtouch, [*arguments, "--out", "f"])
     (line,) = result.stdout.splitlines()
     assert line == "1 flight in f" or line.startswith("f: 0 new")
+
+
+def test_garbage_is_looked_for_again_once_modules_are_loaded():
+    """Also where a module fails to load, and among what comes later."""
+    with pytest.raises(ImportError), loaded_for_good():
+        importlib.import_module("airtouch.no_such_module")
+    assert gc.isenabled()
+
+    class Node:
+        """It refers to itself, so that only a search finds it to be garbage."""
+
+        def __init__(self) -> None:
+            self.itself = self
+
+    node = Node()
+    alive = weakref.ref(node)
+    del node
+    gc.collect()
+    assert alive() is None

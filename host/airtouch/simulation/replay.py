@@ -58,9 +58,13 @@ class _Log(NamedTuple):
 
 
 class _Model(NamedTuple):
-    """What it fills: force over mass and torque (n, 6), rotor speeds (n, 4) rad/s, supply volts (n,)."""
+    """What it fills.
+
+    force over mass and torque (n, 6), angular acceleration (n, 3), rotor speeds (n, 4) rad/s, supply volts (n,).
+    """
 
     motion: np.ndarray
+    turning: np.ndarray
     speeds: np.ndarray
     volts: np.ndarray
 
@@ -91,11 +95,31 @@ def _rotors(plant, s, speed, target, left, out):
     out[5] -= spin_rate
 
 
+@njit
+def _power(plant, speed):
+    """Electrical power of four rotors at speeds (4,), W."""
+    power = 0.0
+    for i in range(4):
+        thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
+        power += plant.power_per_thrust15 * thrust * np.sqrt(thrust)
+    return power
+
+
 _ROWS, _COLUMN = float64[:, ::1], float64[::1]
 
 
+@njit
+def _turning(plant, s, torque, out):
+    """Angular acceleration (3,) under a torque (3,) on a turning body: Euler's equations."""
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        gyroscopic = (s[at.RATES + j] * (plant.inertia[k] * s[at.RATES + k])
+                      - s[at.RATES + k] * (plant.inertia[j] * s[at.RATES + j]))
+        out[i] = (torque[i] - gyroscopic) / plant.inertia[i]
+
+
 @njit(types.void(PLANT, types.NamedTuple((_ROWS, _ROWS, _COLUMN), _Log), EFFECT_SLOTS,
-                 types.NamedTuple((_ROWS, _ROWS, _COLUMN), _Model)), cache=True, nogil=True)
+                 types.NamedTuple((_ROWS, _ROWS, _ROWS, _COLUMN), _Model)), cache=True, nogil=True)
 def _run(plants, log, effects, model):
     """Fill the model, sample by sample, and rotor speeds and thrusts of the signals."""
     plant = plants[0]
@@ -115,10 +139,11 @@ def _run(plants, log, effects, model):
         if np.isfinite(log.volts[k]):
             volts = log.volts[k]
         model.volts[k], model.speeds[k] = volts, speed
-        factor, power = motors.voltage_factor(plant, volts), 0.0
+        factor = motors.voltage_factor(plant, volts)
+        if plant.battery_strength != 0.0:
+            charge, battery_volts = battery.drain(plant, charge, _power(plant, speed), h)
         for i in range(4):
             thrust = plant.thrust_per_speed2 * speed[i] * speed[i]
-            power += plant.power_per_thrust15 * thrust * np.sqrt(thrust)
             s[at.ROTOR_SPEED + i], s[at.THRUST + i] = speed[i], thrust * plant.gain[i]
             commands[k % motors.DELAY_ROWS, i] = log.pwm[k, i]
             target[i] = motors.target_speed(plant, filters.delayed(commands, k, plant.actuator_delay / h, i), factor)
@@ -126,7 +151,7 @@ def _run(plants, log, effects, model):
         slots.add(effects, s, memory, force)
         _motion(plant, speed, force, model.motion[k])
         _rotors(plant, s, speed, target, left, model.motion[k])
-        charge, battery_volts = battery.drain(plant, charge, power, h)
+        _turning(plant, s, model.motion[k, 3:], model.turning[k])
 
 
 def signals_of(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (),
@@ -189,15 +214,13 @@ def run(log: FlightLog, vehicle: Vehicle, active: Sequence[Active] = (), *, peri
     if vehicle.nominal_voltage_v is not None and log.has("vbat_V"):
         volts = _held(log["vbat_V"])
     effects = slots.slots(acting, [generator(seed, 0, key) for key in keys(acting, first="")])
-    model = _Model(np.zeros((n, 6)), np.zeros((n, 4)), np.zeros(n))
-    commands = np.nan_to_num(_held(log.stack(PWM) if pwm is None else pwm))  # a motor without any command is off
-    commands = np.ascontiguousarray(commands)
+    model = _Model(np.zeros((n, 6)), np.zeros((n, 3)), np.zeros((n, 4)), np.zeros(n))
+    commands = np.ascontiguousarray(log.stack(PWM) if pwm is None else pwm, float)
+    if not np.isfinite(commands).all():
+        commands = np.nan_to_num(_held(commands))  # a motor without any command is off
     _run(plant, _Log(s, commands, volts), effects, model)
-    row = plant[0]
-    rates, inertia = s[:, at.RATES:at.RATES + 3], row["inertia"]
-    force, torque = model.motion[:, :3] + row["acc_bias"], model.motion[:, 3:]
-    turning = (torque - _cross(rates, inertia * rates)) / inertia
-    return Replay(force, torque, turning, model.speeds, model.volts)
+    force, torque = model.motion[:, :3] + plant[0]["acc_bias"], model.motion[:, 3:]
+    return Replay(force, torque, model.turning, model.speeds, model.volts)
 
 
 def _held(values: np.ndarray) -> np.ndarray:
@@ -206,11 +229,6 @@ def _held(values: np.ndarray) -> np.ndarray:
         return np.array(values, float)
     first = np.take_along_axis(values, np.isfinite(values).argmax(axis=0)[None], axis=0)[0]
     return hold_finite(values, initial=np.where(np.isfinite(first), first, np.nan))[0]
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products (n, 3); NumPy's own takes several times as long."""
-    return np.stack([a[:, i - 2] * b[:, i - 1] - a[:, i - 1] * b[:, i - 2] for i in range(3)], axis=1)
 
 
 def wrench_of(active: Active, signals: np.ndarray, seed: int = 0) -> np.ndarray:

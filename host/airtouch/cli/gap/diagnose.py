@@ -11,6 +11,7 @@ from airtouch.cli.gap.options import NAMES_SHOWN, Greedy, check_outputs, inputs_
 from airtouch.cli.gap.progress import LateBar
 from airtouch.cli.shared import output
 from airtouch.cli.shared.help import examples
+from airtouch.cli.shared.modules import loaded_for_good
 from airtouch.cli.shared.typed import typed
 from airtouch.errors import AirTouchError
 
@@ -49,9 +50,10 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
         raise click.UsageError("--partner needs --baseline, nominal flights of the same vehicle")
     drawn: list[Path] = []
     with LateBar() as bar:
-        from airtouch.cli.gap import files, next_commands, show
-        from airtouch.simulation import effects
-        from airtouch.vehicle import name_in
+        with loaded_for_good():
+            from airtouch.cli.gap import files, next_commands, show
+            from airtouch.simulation import effects
+            from airtouch.vehicle import name_in
 
         for path in effect_files:
             effects.load_file(path)

@@ -7,9 +7,9 @@ def interpolate_missing(values: np.ndarray) -> np.ndarray:
     """Missing samples (n,) or (n, c) filled along the flight by straight lines; 0 where all are missing."""
     out = np.array(values, dtype=np.float64)
     table = out[:, None] if out.ndim == 1 else out
-    finite = np.isfinite(table)
-    for j in np.flatnonzero(~finite.all(axis=0)):
-        table[:, j] = _bridged(table[:, j], finite[:, j]) if finite[:, j].any() else 0.0
+    finite = np.ascontiguousarray(np.isfinite(table).T)  # NumPy is slow to ask for all of short rows
+    for j in np.flatnonzero(~finite.all(axis=1)):
+        table[:, j] = _bridged(table[:, j], finite[j]) if finite[j].any() else 0.0
     return out
 
 

@@ -209,4 +209,4 @@ def _power_and_phase(loop: AxisLoop, f: np.ndarray) -> tuple[np.ndarray, float]:
 
 def _same_loop(one: PlantRow, two: PlantRow) -> bool:
     """Whether two plant rows have the same roll and pitch loops."""
-    return all(np.array_equal(one[k], two[k]) for k in LOOP_FIELDS)
+    return all((one[k] == two[k]).all() for k in LOOP_FIELDS)

@@ -96,7 +96,10 @@ class ReplayedFlight:
     workspace: Workspace = field(default_factory=Workspace, init=False, repr=False)
 
     def residual(self, active: Sequence[Active] = ()) -> np.ndarray:
-        """The function `residual`: a passing effect adds in its seconds what it adds there when it always acts."""
+        """The function `residual`, as a new array.
+
+        A passing effect adds in its seconds what it adds there when it always acts.
+        """
         gated, always = [a for a in active if a.gate], [a for a in active if not a.gate]
         if not gated:
             return self._ungated(active)
@@ -114,36 +117,30 @@ class ReplayedFlight:
 
     def _ungated(self, active: Sequence[Active]) -> np.ndarray:
         """Residual of effects that always act."""
-        return _ungated_residual(self.flight, self.vehicle, active, self.loop, self.seed)
-
-
-def _ungated_residual(flight: Flight, vehicle: Vehicle, active: Sequence[Active], loop: ClosedLoop | None,
-                      seed: int) -> np.ndarray:
-    """`residual` of effects that always act."""
-    out = np.full((len(flight), COUNT), np.nan)
-    plant = prepare(vehicle, active)[0]
-    row = plant[0]
-    signals = flight.signals.copy()
-    signals[:, at.MASS], signals[:, at.HOVER_SPEED] = row["mass"], hover_speed(plant)
-    signals[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
-    signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
-    model = replay.run(flight.log, vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm, seed=seed)
-    force, turning = model.specific_force, model.angular_acceleration
-    # measured is a difference between two samples, which is the mean acceleration between them: so is the modelled one
-    turning = 0.5 * (turning + np.concatenate([turning[1:], turning[-1:]]))
-    rest = flight.phase == GROUND
-    if rest.any():
-        up = flight.body_to_world[:, 2, :] * vehicle.gravity_mps2
-        force = np.where(rest[:, None], up + row["acc_bias"], force)
-        turning = np.where(rest[:, None], 0.0, turning)
-    out[:, FORCE] = flight.acceleration - force
-    out[:, TORQUE] = angular_acceleration(flight) - turning
-    if flight.rates is not None:
-        out[-1, TORQUE] = 0.0  # no sample follows the last one, so that it has no measured acceleration
-        out[:, RATE] = flight.rates - row["gyro_bias"]
-    if loop is not None:
-        out[:, COMMAND] = loop.commands_without(flight, active)
-    return out
+        flight, out = self.flight, np.full((len(self.flight), COUNT), np.nan)
+        plant = prepare(self.vehicle, active)[0]
+        row = plant[0]
+        # the replay writes to them, always to the same columns: one copy serves every hypothesis
+        signals = self.workspace.cached("signals", (), flight.signals.copy)
+        signals[:, at.MASS], signals[:, at.HOVER_SPEED] = row["mass"], hover_speed(plant)
+        signals[:, at.ROTOR_X:at.ROTOR_X + 4] = row["rotor_x"] - row["com"][0]
+        signals[:, at.ROTOR_Y:at.ROTOR_Y + 4] = row["rotor_y"] - row["com"][1]
+        model = replay.run(flight.log, self.vehicle, active, period_s=PERIOD_S, signals=signals, pwm=flight.pwm,
+                           seed=self.seed)
+        force, turning = model.specific_force, model.angular_acceleration
+        # measured is a difference between two samples, the mean acceleration between them: so is the modelled one
+        turning = 0.5 * (turning + np.concatenate([turning[1:], turning[-1:]]))
+        rest = flight.phase == GROUND
+        force[rest] = flight.body_to_world[rest, 2, :] * self.vehicle.gravity_mps2 + row["acc_bias"]
+        turning[rest] = 0.0
+        out[:, FORCE] = flight.acceleration - force
+        out[:, TORQUE] = angular_acceleration(flight) - turning
+        if flight.rates is not None:
+            out[-1, TORQUE] = 0.0  # no sample follows the last one, so that it has no measured acceleration
+            out[:, RATE] = flight.rates - row["gyro_bias"]
+        if self.loop is not None:
+            out[:, COMMAND] = self.loop.commands_without(flight, active)
+        return out
 
 
 def angular_acceleration(flight: Flight) -> np.ndarray:

@@ -62,7 +62,9 @@ def _in_flight(flight: Flight, begin: np.ndarray) -> np.ndarray:
 
 def bridged_residual(replayed: ReplayedFlight, active: Sequence[Active]) -> np.ndarray:
     """Measured minus modelled (n, COUNT), straight lines where rows were lost or the legs touched the floor."""
-    return interpolate_missing(np.where(replayed.flight.bridged[:, None], np.nan, replayed.residual(active)))
+    out = replayed.residual(active)
+    out[replayed.flight.bridged] = np.nan
+    return interpolate_missing(out)
 
 
 def _without(flight: Flight, rows: np.ndarray) -> Flight:

@@ -128,7 +128,8 @@ def load(name_or_path: str | Path = DEFAULT, depth: int = 0) -> np.ndarray:
         near = difflib.get_close_matches(name, _names(), 3, 0.3)
         hint = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names())}"
         raise AirTouchError(f"no firmware {name!r}; {hint} A path to a .toml file works too")
-    return _built_in(name).copy()
+    # as bytes: NumPy copies a record field by field, forty times as slow
+    return np.frombuffer(bytearray(_built_in(name).tobytes()), DTYPE)
 
 
 @functools.cache
