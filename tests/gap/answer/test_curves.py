@@ -135,11 +135,35 @@ def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz, constan
 
 
 def test_flight_of_the_signal_is_that_of_the_median_gap():
-    """By the standard deviation in the cell's channel; in another channel their order is another."""
+    """By the rms in the cell's channel; in another channel their order is another."""
     noisy_flights = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
             for i, (forward, up) in enumerate([(3.0, 1.0), (1.0, 2.0), (2.0, 3.0)])]
     assert curves_with(*noisy_flights).signal.flight == "2.0"
     assert curves_with(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
+
+
+@pytest.mark.parametrize(("band_hz", "flown"), [((0.0, 0.5), "constant 2"), ((0.5, 2.0), "constant 0"),
+                                                ((2.0, 6.0), "constant 4")])
+def test_the_median_is_that_of_the_gap_in_the_cells_band(band_hz, flown):
+    """Of constant gaps with pushes at 1 and 4 Hz, in m/s^2; the noise of all is in an order of its own."""
+    def push(constant, slow, fast, i):
+        of_axis = constant + slow * np.sin(2.0 * np.pi * TIME_S) + fast * np.sin(8.0 * np.pi * TIME_S)
+        return of_axis[:, None] * [1.0, 0.0, 0.0] + noise(SECONDS, 0.1 * i, i)
+
+    pushed = [flight(SECONDS, push(*gaps), name=f"constant {gaps[0]}")
+              for gaps in ((2, 0.5, 4.0, 1), (4, 1.5, 3.0, 2), (0, 1.0, 2.0, 3))]
+    assert curves_with(*pushed, cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)]).signal.flight == flown
+
+
+@pytest.mark.parametrize(("phase", "flown"), [("over platform", "0"), ("hover", "3"), ("landing", "1")])
+def test_the_median_is_that_of_the_gap_in_the_cells_phase(phase, flown):
+    """Of five flights three cross a platform, where their gap is another. None lands: then it is that in the air."""
+    crossing = (TIME_S > 6.0) & (TIME_S < 9.0)
+    flights = [flight(SECONDS, np.where(crossing, there, elsewhere)[:, None] * [1.0, 0.0, 0.0], name=str(i),
+                      phase=np.where(crossing & crosses, KINDS.index("over platform"), KINDS.index("hover")))
+               for i, (elsewhere, there, crosses) in enumerate([
+                   (0.0, 1.0, True), (2.0, 0.8, True), (1.0, 5.0, True), (1.5, 1.5, False), (9.0, 9.0, False)])]
+    assert curves_with(*flights, cells=[cell("force_x", phase, 1.0)]).signal.flight == flown
 
 
 def test_flight_of_a_passing_effect_is_one_in_which_it_acts():

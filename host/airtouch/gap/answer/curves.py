@@ -1,6 +1,6 @@
 """The curves of a report: signals of the headline's cell, spectra, commands."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -115,7 +115,7 @@ def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight]
             for f in flights[:MOST_FLIGHTS]]
     channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     gated = {name for t in effects for name, *_ in t.gate}  # flights in which a passing effect acts
-    median = _median_residual([r for r in residuals if r.flight.name in gated] or residuals, cells[0].channel)
+    median = _median_residual(residuals, cells[0], gated)
     signal = None if median is None else _signal(median, cells[0], whole_map, effects)
     return Curves(signal, frequencies(AIR), _spectra(study, residuals, nominal, effects, channels), commands,
                   bool(random_of(effects)))
@@ -167,14 +167,21 @@ def _height(flight: Flight) -> np.ndarray | None:
     return np.where(flight.usable, flight.signals[:, at.HEIGHT], np.nan)
 
 
-def _median_residual(residuals: Sequence[FlightResidual], channel: str) -> FlightResidual | None:
-    """The residual whose standard deviation in a channel is the median; None where no flight has the channel.
+def _median_residual(residuals: Sequence[FlightResidual], cell: Cell, gated: Collection[str],
+                     ) -> FlightResidual | None:
+    """The residual whose rms in a cell's channel, band and phase is the median; None where no flight has the channel.
 
-    Flights that lack the channel do not count, nor does what is on the ground.
+    Flights that lack the phase do not count, nor do those that are not gated; each kind does where there is no other.
     """
-    in_air = [r.before[r.flight.usable & (r.flight.phase != GROUND), COLUMN[channel]] for r in residuals]
-    known = [(float(np.nanstd(values)), r) for values, r in zip(in_air, residuals, strict=True)
-             if np.isfinite(values).any()]
+    column, phase = COLUMN[cell.channel], KINDS.index(cell.phase)
+    band_hz = cell.band_hz if cell.band_hz in MAP_BANDS_HZ else (0.0, LEAST_CUTOFF_HZ)
+    gaps = [_band_passed(r.flight, r.before[:, column], band_hz) for r in residuals]
+    inside = [np.isfinite(gap) & (r.flight.phase == phase) for gap, r in zip(gaps, residuals, strict=True)]
+    if not any(here.any() for here in inside):
+        inside = [np.isfinite(gap) & (r.flight.phase != GROUND) for gap, r in zip(gaps, residuals, strict=True)]
+    known = [(float(np.mean(gap[here] ** 2)), r) for gap, here, r in zip(gaps, inside, residuals, strict=True)
+             if here.any()]
+    known = [pair for pair in known if pair[1].flight.name in gated] or known
     return sorted(known, key=lambda pair: pair[0])[len(known) // 2][1] if known else None
 
 
