@@ -184,7 +184,7 @@ def _plots(curves: Curves | None) -> list[Plot]:
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
-        text = f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. "
+        text = f"Mean over the flights, {MOST_FLIGHTS} of them if there are more. "
         if any(spectrum.floor is not None for spectrum in curves.spectra):
             text += "Floor: the same of the baseline flights; with few or none, the noise of the sensors. "
         text += "The lowest frequency holds a part of a constant gap."

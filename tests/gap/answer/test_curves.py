@@ -175,6 +175,16 @@ def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
     assert curves_with(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
 
 
+@pytest.mark.parametrize(("phase", "gate"), [("hover", (("last", 1.0, 2.0),)), ("landing", ())])
+def test_the_one_flight_that_can_be_drawn_is_though_it_is_the_last_of_many(phase, gate):
+    """The 41st is the one in which the effect acts, or that lands."""
+    phases = np.repeat([KINDS.index("hover"), KINDS.index(phase)], 100)
+    flights = [*(flight(2.0, noise(2.0, 1.0, i), name=str(i)) for i in range(40)),
+               flight(2.0, FORWARD, name="last", phase=phases)]
+    drawn = curves_with(*flights, effects=[replace(bias(0.4), gate=gate)], cells=[cell("force_x", phase, 0.5)]).signal
+    assert drawn.flight == "last" and drawn.acts_s == tuple(act[1:] for act in gate) and drawn.after is not None
+
+
 def test_an_effect_that_changes_no_sample_has_no_curve_after():
     """A bias of 0 and one of 0.4 m/s^2."""
     pushed = flight(SECONDS, FORWARD)

@@ -25,7 +25,8 @@ from airtouch.simulation import signals as at
 
 GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
 SAME = 1e-6  #: of the largest value: less is no difference between two curves; chosen
-MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
+#: flights from which the curves are made, first those that can be drawn as the signal; chosen for time
+MOST_FLIGHTS = 40
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
 #: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
 LEAST_CUTOFF_HZ = 2.0
@@ -106,15 +107,19 @@ def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight]
 
     cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
     without any, the commands are all. whole_map: every cell of the map, whose floors are drawn.
+
+    Of more than MOST_FLIGHTS flights those that have the phase of that cell come first, of these those in which a
+    passing effect acts.
     """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
     if not cells or not flights:
         return Curves(commands=commands)
     active = [t.active() for t in mean_of(effects)]
-    residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
-            for f in flights[:MOST_FLIGHTS]]
-    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     gated = {name for t in effects for name, *_ in t.gate}  # flights in which a passing effect acts
+    phase = KINDS.index(cells[0].phase)
+    chosen = sorted(flights, key=lambda f: (phase not in f.phase, f.name not in gated))[:MOST_FLIGHTS]
+    residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None) for f in chosen]
+    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     median = _median_residual(residuals, cells[0], gated)
     signal = None if median is None else _signal(median, cells[0], whole_map, effects)
     return Curves(signal, frequencies(AIR), _spectra(study, residuals, nominal, effects, channels), commands,
