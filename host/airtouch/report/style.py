@@ -29,6 +29,15 @@ OUTSIDE = 3  #: zorder of the marks of what is outside a pane, above that of lin
 TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
 
 
+class PlotFigure(Figure):
+    """A figure whose files have FILE_STYLE, whoever saves them."""
+
+    def savefig(self, *args: Any, **settings: Any) -> None:
+        """Save it as `Figure.savefig` does."""
+        with matplotlib.rc_context(FILE_STYLE):
+            super().savefig(*args, **settings)
+
+
 class Room(NamedTuple):
     """Room for labels and titles, inch: left of, below and above a pane, right of all, and at the top of all."""
 
@@ -46,7 +55,7 @@ def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: R
     size_in: width and height, inch. room: fixes the layout, and all panes share the x axis, so that there is room below
     the lowest alone; without, matplotlib finds the layout, for which it draws twice. subplots: as in `Figure.subplots`.
     """
-    figure = Figure(figsize=size_in, layout=None if room else "constrained")
+    figure = PlotFigure(figsize=size_in, layout=None if room else "constrained")
     if room:
         subplots = {"sharex": True, "gridspec_kw": _grid(size_in, rows, columns, room), **subplots}
     axes = figure.subplots(rows, columns, squeeze=False, **subplots)
@@ -74,8 +83,7 @@ def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[No
 def image(figure: Figure, form: str = "png") -> bytes:
     """The figure as the bytes of an image file, in one of FORMATS."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(FILE_STYLE):
-        figure.savefig(buffer, format=form, metadata=FORMATS[form])
+    figure.savefig(buffer, format=form, metadata=FORMATS[form])
     return buffer.getvalue()
 
 
