@@ -134,6 +134,15 @@ def test_powers_are_labelled_in_plain_text():
     assert len(ax.get_yticks()) > 2
 
 
+def test_ticks_that_a_user_sets_have_true_labels():
+    power = np.geomspace(1e-4, 1e-1, 51)
+    (ax,) = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    ax.set_yticks([1e-3, 2e-3, 5.5e-3, 2e-2])
+    ax.set_xticks([3.0, 30.0])
+    labels = [[t.get_text() for t in axis.get_ticklabels()] for axis in (ax.xaxis, ax.yaxis)]
+    assert labels == [["3", "30"], ["10⁻³", "2·10⁻³", "5.5·10⁻³", "2·10⁻²"]]
+
+
 def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others():
     power = np.full(51, 4.0)
     shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]

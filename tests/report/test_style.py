@@ -111,3 +111,20 @@ def test_a_curve_within_its_pane_has_no_mark():
     ax.plot(np.sin(np.arange(2000)))
     style.limit(ax, np.sin(np.arange(2000)))
     assert len(ax.get_lines()) == 1
+
+
+@pytest.mark.parametrize(("limits", "above", "below"), [
+    ((-10.0, 10.0), [], []), ((-10.0, 5.0), [50], []), ((10.0, -4.0), [80], []), ((10.0, -10.0), [], []),
+    ((-4.0, 5.0), [50], [80])])
+def test_marks_are_those_of_the_limits_that_the_user_sets(limits, above, below):
+    """Of a spike up and one down; also upside down. A line across the whole pane leaves it nowhere."""
+    y = np.where(np.arange(1000) == 50, 8.0, np.where(np.arange(1000) == 80, -6.0, np.sin(np.arange(1000))))
+    figure, ((ax,),) = style.panes(SIZE_IN)
+    ax.plot(y)
+    style.limit(ax, y)
+    ax.axvline(500.0, color="black")
+    ax.set_ylim(limits)
+    assert (marks(ax, "^"), marks(ax, "v")) == (above, below)
+    ax.autoscale()
+    figure.draw_without_rendering()
+    assert (marks(ax, "^"), marks(ax, "v")) == ([], []) and max(ax.get_ylim()) > 8.0

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter, StrMethodFormatter
 
 from airtouch.gap.answer.curves import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
@@ -123,7 +123,8 @@ def _legend(figure: Figure, axes: np.ndarray) -> None:
 def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     """Set plain ticks, Hz, on the frequency axis that the panes share."""
     for ax in axes:
-        ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        ax.set_xticks(ticks)
+        ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
         _power_axis(ax)
     axes[-1].set_xlabel("frequency, Hz")
@@ -146,8 +147,10 @@ def _power_axis(ax: Axes) -> None:
 
 
 def power_of_ten(x: float, _place: int | None = None) -> str:
-    """The label of a tick of a log axis: 10⁻³. That of matplotlib needs its parser of formulas, a second to begin."""
-    return "10" + f"{round(np.log10(x))}".translate(SUPERSCRIPT)
+    """The label of a tick of a log axis: 10⁻³, 2·10⁻³. Matplotlib's needs its parser of formulas, a second to begin."""
+    factor, exponent = f"{x:.2e}".split("e")
+    power = "10" + f"{int(exponent)}".translate(SUPERSCRIPT)
+    return power if float(factor) == 1.0 else f"{float(factor):g}·{power}"
 
 
 def _unit(unit: str) -> str:
