@@ -183,8 +183,8 @@ def _range(ax: Axes, plotted: PlottedFlight) -> None:
 
 
 def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
-    """Set the label, and the limits by the values; with a legend unless it says not."""
-    limit(ax, values)
+    """Set the label, and the limits by the values, (n,) or (n, curves); with a legend unless it says not."""
+    limit(ax, *np.atleast_2d(values.T))
     ax.set_ylabel(label, fontsize=8)
     if legend:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=3, fontsize=7, frameon=False, borderpad=0.1)
