@@ -40,6 +40,7 @@ NO_PLOTS = "Pictures are left out, because matplotlib is not installed: pip inst
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
+BEFORE_AFTER = "Before and after: without and with the named effects in the model."
 #: in the plot of a signal, by `style.limit`
 AXIS_LIMITS = "An axis holds the middle 99 % of each curve; a triangle at its edge is where a curve leaves it."
 PLOTS = ("signal", "spectra", "commands")  #: names of the page's plots, in its order
@@ -175,6 +176,7 @@ def _plots(curves: Curves | None) -> list[Plot]:
         signal = curves.signal
         phases = {KINDS[kind] for kind in np.unique(signal.phase)}
         caption = [f"Flight {Path(signal.flight).name}.",
+                   *([BEFORE_AFTER] if signal.after is not None else []),
                    *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
                    *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
                    *(["Yellow: over a platform."] if "over platform" in phases else []),
@@ -184,7 +186,9 @@ def _plots(curves: Curves | None) -> list[Plot]:
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
-        text = f"Mean over the flights, {MOST_FLIGHTS} of them if there are more. "
+        text = f"Mean over the flights ({MOST_FLIGHTS} of them if there are more). "
+        if any(spectrum.after is not None for spectrum in curves.spectra):
+            text += f"{BEFORE_AFTER} "
         if any(spectrum.floor is not None for spectrum in curves.spectra):
             text += "Floor: the same of the baseline flights; with few or none, the noise of the sensors. "
         text += "The lowest frequency holds a part of a constant gap."
