@@ -143,7 +143,11 @@ def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell], eff
 
 
 def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
-    """Band in which a cell's signal is drawn, Hz: its own; up to LEAST_CUTOFF_HZ where it and the map's others are."""
+    """The band in which a cell's signal is drawn, Hz: as a rule the cell's own.
+
+    It is 0 to LEAST_CUTOFF_HZ where the cell's band lies within that and the map has the channel in all bands there,
+    and where the cell's band is none of MAP_BANDS_HZ.
+    """
     low = [band for band in MAP_BANDS_HZ if band[1] <= LEAST_CUTOFF_HZ]
     in_map = {c.band_hz for c in whole_map if c.channel == cell.channel}
     own = cell.band_hz in MAP_BANDS_HZ and not (cell.band_hz in low and in_map.issuperset(low))
