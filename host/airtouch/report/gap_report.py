@@ -175,7 +175,7 @@ def _plots(curves: Curves | None) -> list[Plot]:
     if curves.signal is not None:
         signal = curves.signal
         phases = {KINDS[kind] for kind in np.unique(signal.phase)}
-        caption = [f"Flight {Path(signal.flight).name}.",
+        caption = [f"Flight {Path(signal.flight).name}.", *([curves.remark] if curves.remark else []),
                    *([BEFORE_AFTER] if signal.after is not None else []),
                    *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
                    *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
@@ -187,6 +187,7 @@ def _plots(curves: Curves | None) -> list[Plot]:
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
         text = f"Mean over the flights ({MOST_FLIGHTS} of them if there are more). "
+        text += f"{curves.remark} " if curves.remark else ""
         if any(spectrum.after is not None for spectrum in curves.spectra):
             text += f"{BEFORE_AFTER} "
         if any(spectrum.floor is not None for spectrum in curves.spectra):

@@ -91,7 +91,8 @@ class Curves:
 
     signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
     spectra; commands: None where no flight has a steady stretch; random: whether an effect that acts at random is
-    among those named.
+    among those named; remark: in what the gap that is drawn is another than that of the answer, a sentence, "" where it
+    is the same.
     """
 
     signal: Signal | None = None
@@ -99,6 +100,7 @@ class Curves:
     spectra: tuple[Spectrum, ...] = ()
     commands: MeanSpectra | None = None
     random: bool = False
+    remark: str = ""
 
 
 def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
