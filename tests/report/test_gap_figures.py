@@ -5,12 +5,14 @@ import unicodedata
 from dataclasses import replace
 from types import SimpleNamespace
 
+import matplotlib.colors
 import numpy as np
 import pytest
 
 from airtouch.gap.answer.curves import Signal, Spectrum
 from airtouch.logs.segments import KINDS
-from airtouch.report import gap_figures
+from airtouch.report import gap_figures, style
+from made_diagnosis import cell
 
 TIME_S = np.arange(100) * 0.1
 FREQUENCY_HZ = np.linspace(0.0, 50.0, 51)
@@ -106,6 +108,18 @@ def test_phases_behind_the_signal_have_the_colours_of_its_caption():
     assert first == third != second
     for span, begin, end in zip(spans, (0, 50, 75), (24, 74, 99), strict=True):
         assert (span.get_x(), span.get_x() + span.get_width()) == pytest.approx((TIME_S[begin], TIME_S[end]))
+
+
+def test_the_phase_of_the_answers_cell_has_a_bar_in_every_pane():
+    """Twice in hover, which is not shaded, at the lower end of the pane."""
+    phase = np.repeat([KINDS.index(k) for k in ("hover", "cruise", "hover", "landing")], 25)
+    for ax in gap_figures.signals(replace(signal(phase=phase), cell=cell("force_x", "hover", 1.0))).axes:
+        bars = [p for p in ax.patches if matplotlib.colors.to_hex(p.get_facecolor()) == style.BLUE]
+        assert [(p.get_x(), p.get_x() + p.get_width()) for p in bars] == [
+            (TIME_S[0], TIME_S[24]), (TIME_S[50], pytest.approx(TIME_S[74]))]
+        assert all(p.get_y() == 0.0 and p.get_height() < 0.1 for p in bars)
+    (ax,) = gap_figures.signals(signal(measured=False, after=False)).axes
+    assert not ax.patches
 
 
 @pytest.mark.parametrize("after", [True, False])

@@ -88,8 +88,10 @@ def test_only_phases_that_are_drawn_are_explained(pushed_flights, tmp_path):
     for name, one in (("hover", hover), ("rising", rising)):
         gap_report.write_diagnosis(tmp_path / f"{name}.html", one, command="x")
         texts.append(checked(tmp_path / f"{name}.html")[0])
-    assert not any(word in texts[0] for word in ("Blue:", "Yellow:", "Green bar:"))
-    assert "Blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
+    assert not any(word in texts[0] for word in ("Light blue:", "Yellow:", "Green bar:"))
+    bars = [re.findall(r"Blue bar: the phase of the answer's cell \(([^)]*)\)", text) for text in texts]
+    assert bars == [["in hover, 0-0.5 Hz, forward force"], []]
+    assert "Light blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
 
 
 def test_captions_say_what_before_and_after_are_where_there_is_an_after(pushed_flights, tmp_path):

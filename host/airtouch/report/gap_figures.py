@@ -22,6 +22,8 @@ FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of den
 ABOVE = 2.5  #: zorder of the measured curve and of the floor, above that of lines, 2: a dense curve would hide them
 #: look of the seconds in which an effect acts: a bar along the upper end of a pane
 ACTS: dict[str, Any] = {"facecolor": AFTER, "ymin": 0.96, "lw": 0.0, "zorder": ABOVE}
+#: look of the seconds in the phase of the answer's cell: a bar along the lower end of a pane
+ANSWER: dict[str, Any] = {"facecolor": BLUE, "ymax": 0.04, "lw": 0.0, "zorder": ABOVE}
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
@@ -61,7 +63,7 @@ def signals(signal: Signal) -> Figure:
         axes[-1].set_xlabel("time, s")
         limit(gap, *gaps, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
-            _phases(ax, signal.time_s, signal.phase)
+            _phases(ax, signal)
             for begin, end in signal.acts_s:
                 ax.axvspan(begin, end, **ACTS)
             ax.margins(x=0)
@@ -158,8 +160,9 @@ def _unit(unit: str) -> str:
     return unit.replace("^2", "²")
 
 
-def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
-    """Shade take-off, landing and platforms behind the curves."""
+def _phases(ax: Axes, signal: Signal) -> None:
+    """Shade take-off, landing and platforms behind the curves, and mark the phase of the answer's cell."""
+    time_s, phase = signal.time_s, signal.phase
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
     for a, b in zip(bounds[:-1], bounds[1:] - 1, strict=True):
         kind = KINDS[phase[a]]
@@ -168,3 +171,5 @@ def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
             if b - a > 0.15 * len(phase):
                 ax.text((time_s[a] + time_s[b]) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
                         va="top", fontsize=8, color=GREY)
+        if signal.cell is not None and kind == signal.cell.phase:
+            ax.axvspan(time_s[a], time_s[b], **ANSWER)

@@ -27,7 +27,7 @@ from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.cell_words import remaining_in_words
+from airtouch.gap.where.cell_words import place_in_words, remaining_in_words
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.segments import KINDS
 from airtouch.report import gap_tables
@@ -178,7 +178,9 @@ def _plots(curves: Curves | None) -> list[Plot]:
         caption = [f"Flight {Path(signal.flight).name}.", *([curves.remark] if curves.remark else []),
                    *([BEFORE_AFTER] if signal.after is not None else []),
                    *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
-                   *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
+                   *([f"Blue bar: the phase of the answer's cell ({place_in_words(signal.cell)})."]
+                     if signal.cell is not None and signal.cell.phase in phases else []),
+                   *(["Light blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
                    *(["Yellow: over a platform."] if "over platform" in phases else []),
                    *(["Green bar: the effect acts."] if signal.acts_s else []),
                    *_curves_of_a_random_effect(curves), AXIS_LIMITS]

@@ -40,7 +40,7 @@ def test_signal_is_that_of_the_cell():
     drawn = curves_with(flight(SECONDS, FORWARD, name="pushed.csv")).signal
     assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
     np.testing.assert_allclose(drawn.time_s, TIME_S)
-    assert drawn.phase.shape == TIME_S.shape and drawn.after is None
+    assert drawn.phase.shape == TIME_S.shape and drawn.after is None and drawn.cell == LOWEST
 
 
 def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phase_by_phase():

@@ -53,7 +53,7 @@ class Signal:
     the latter None without effects, and of one at random that has no mean; phase: of each sample, a place in
     `segments.KINDS`; floor: rms of the floor in that band and the sample's phase, NaN where the map does not have it;
     height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known;
-    acts_s: begin and end, s, of each stretch in which a passing effect acts.
+    acts_s: begin and end, s, of each stretch in which a passing effect acts; cell: that of the answer.
     """
 
     flight: str
@@ -68,6 +68,7 @@ class Signal:
     floor: np.ndarray
     height_m: np.ndarray | None = None
     acts_s: tuple[tuple[float, float], ...] = ()
+    cell: Cell | None = None
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell], eff
     return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, measured, before, after, floor,
                   _height(flight) if any(t.name == GROUND_EFFECT for t in effects) else None,
-                  tuple((begin, end) for t in effects for name, begin, end in t.gate if name == flight.name))
+                  tuple((begin, end) for t in effects for name, begin, end in t.gate if name == flight.name), cell)
 
 
 def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
