@@ -82,7 +82,7 @@ def reliability(curves: Mapping[str, Reliability]) -> Figure:
                 ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name),
                            label=f"{name}, ECE {curve.ece:.3f}")
         ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="fraction truly over",
-               title="Reliability; a dot's area is its fraction of the samples")
+               title="Reliability; the larger a dot, the more samples")
         ax.legend(loc="upper left", frameon=False)
     return figure
 
