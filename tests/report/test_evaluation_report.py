@@ -67,6 +67,18 @@ def test_report_is_one_file_with_the_figures(tmp_path):
         write_report(path, "again", score_report(scores), parameters={}, command="x")
 
 
+def test_the_sentence_above_a_plot_names_its_detector_and_the_plots_say_that_they_show_its_lag(tmp_path):
+    """As the errors are without it, a marker lies later than the sentence says."""
+    flight = flight_shown()
+    for name, shown in (("with", [flight]), ("without", [])):
+        write_report(tmp_path / name, "x", score_report({"paper": [flight.score], "baseline": []}, shown),
+                     parameters={}, command="x")
+    text = (tmp_path / "with").read_text()
+    assert f"<p>paper: {in_words(flight.score)}</p>" in text
+    assert text.index("Flight a&lt;b&gt;.csv") > text.index("shows an edge when it was reported")
+    assert "shows an edge when it was reported" not in (tmp_path / "without").read_text()
+
+
 def test_words_say_misses_and_false_edges():
     flight = flight_shown()
     assert in_words(flight.score) == ("entry at 2.00 s detected 0.10 s late (0.020 m); exit at 4.00 s missed; "
