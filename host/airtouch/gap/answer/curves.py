@@ -183,7 +183,8 @@ def _median_residual(residuals: Sequence[FlightResidual], cell: Cell, gated: Col
                      ) -> FlightResidual | None:
     """The residual whose rms in a cell's channel, band and phase is the median; None where no flight has the channel.
 
-    Flights that lack the phase do not count, nor do those that are not gated; each kind does where there is no other.
+    gated: names of the flights in which a passing effect acts. Flights that lack the phase do not count, nor do those
+    that are not gated, unless there are no others.
     """
     column, phase = COLUMN[cell.channel], KINDS.index(cell.phase)
     band_hz = cell.band_hz if cell.band_hz in MAP_BANDS_HZ else (0.0, LEAST_CUTOFF_HZ)
