@@ -53,7 +53,8 @@ def test_a_flight_without_an_edge_says_so(tmp_path):
     assert result.exit_code == 0 and result.output.splitlines()[-2] == "no edges found in the down range"
 
 
-@pytest.mark.parametrize(("ending", "first"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF-")])
+@pytest.mark.parametrize(("ending", "first"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF-"),
+                                               ("SVG", b"<?xml")])
 def test_named_as_the_picture_the_geojson_goes_beside_it(tmp_path, ending, first):
     """Both have a file: written to one name, the picture would replace the GeoJSON without a word."""
     logs.write(zigzag_log(), tmp_path / "zigzag.csv")

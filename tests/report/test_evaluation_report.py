@@ -67,6 +67,18 @@ def test_report_is_one_file_with_the_figures(tmp_path):
         write_report(path, "again", score_report(scores), parameters={}, command="x")
 
 
+def test_the_sentence_above_a_plot_names_its_detector_and_the_plots_say_that_they_show_its_lag(tmp_path):
+    """As the errors are without it, a marker lies later than the sentence says."""
+    flight = flight_shown()
+    for name, shown in (("with", [flight]), ("without", [])):
+        write_report(tmp_path / name, "x", score_report({"paper": [flight.score], "baseline": []}, shown),
+                     parameters={}, command="x")
+    text = (tmp_path / "with").read_text()
+    assert f"<p>paper: {in_words(flight.score)}</p>" in text
+    assert text.index("Flight a&lt;b&gt;.csv") > text.index("shows an edge when it was reported")
+    assert "shows an edge when it was reported" not in (tmp_path / "without").read_text()
+
+
 def test_words_say_misses_and_false_edges():
     flight = flight_shown()
     assert in_words(flight.score) == ("entry at 2.00 s detected 0.10 s late (0.020 m); exit at 4.00 s missed; "
@@ -157,3 +169,13 @@ def test_flights_of_one_name_in_two_folders_have_their_own_traces():
 def result(name, detections):
     flight = flight_shown(name, detections)
     return Result(flight.log, flight.trace, flight.score)
+
+
+def test_an_axis_holds_the_middle_99_percent_of_each_of_its_curves():
+    """The second of three curves alone is off by 5 in 1 % of the flight: a third of that of all values together."""
+    flight = flight_shown()
+    channels = np.zeros((N, 9))
+    channels[:6, 4] = np.deg2rad(5.0)
+    trace = Trace(flight.trace.probability, [], {"channels": channels})
+    rates = figures.flight(flight.log, trace).axes[1]
+    assert rates.get_ylabel().startswith("rates") and rates.get_ylim()[1] > 5.0

@@ -5,12 +5,14 @@ import unicodedata
 from dataclasses import replace
 from types import SimpleNamespace
 
+import matplotlib.colors
 import numpy as np
 import pytest
 
 from airtouch.gap.answer.curves import Signal, Spectrum
 from airtouch.logs.segments import KINDS
-from airtouch.report import gap_figures
+from airtouch.report import gap_figures, style
+from made_diagnosis import cell
 
 TIME_S = np.arange(100) * 0.1
 FREQUENCY_HZ = np.linspace(0.0, 50.0, 51)
@@ -108,6 +110,18 @@ def test_phases_behind_the_signal_have_the_colours_of_its_caption():
         assert (span.get_x(), span.get_x() + span.get_width()) == pytest.approx((TIME_S[begin], TIME_S[end]))
 
 
+def test_the_phase_of_the_answers_cell_has_a_bar_in_every_pane():
+    """Twice in hover, which is not shaded, at the lower end of the pane."""
+    phase = np.repeat([KINDS.index(k) for k in ("hover", "cruise", "hover", "landing")], 25)
+    for ax in gap_figures.signals(replace(signal(phase=phase), cell=cell("force_x", "hover", 1.0))).axes:
+        bars = [p for p in ax.patches if matplotlib.colors.to_hex(p.get_facecolor()) == style.BLUE]
+        assert [(p.get_x(), p.get_x() + p.get_width()) for p in bars] == [
+            (TIME_S[0], TIME_S[24]), (TIME_S[50], pytest.approx(TIME_S[74]))]
+        assert all(p.get_y() == 0.0 and p.get_height() < 0.1 for p in bars)
+    (ax,) = gap_figures.signals(signal(measured=False, after=False)).axes
+    assert not ax.patches
+
+
 @pytest.mark.parametrize("after", [True, False])
 def test_spectra_have_a_pane_for_each_channel(after):
     power = np.full(51, 4.0)
@@ -132,6 +146,15 @@ def test_powers_are_labelled_in_plain_text():
         exponent = int("".join(str(unicodedata.digit(c)) for c in digits))
         assert (-exponent if sign else exponent) == round(np.log10(y))
     assert len(ax.get_yticks()) > 2
+
+
+def test_ticks_that_a_user_sets_have_true_labels():
+    power = np.geomspace(1e-4, 1e-1, 51)
+    (ax,) = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    ax.set_yticks([1e-3, 2e-3, 5.5e-3, 2e-2])
+    ax.set_xticks([3.0, 30.0])
+    labels = [[t.get_text() for t in axis.get_ticklabels()] for axis in (ax.xaxis, ax.yaxis)]
+    assert labels == [["3", "30"], ["10⁻³", "2·10⁻³", "5.5·10⁻³", "2·10⁻²"]]
 
 
 def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others():

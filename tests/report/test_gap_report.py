@@ -88,8 +88,24 @@ def test_only_phases_that_are_drawn_are_explained(pushed_flights, tmp_path):
     for name, one in (("hover", hover), ("rising", rising)):
         gap_report.write_diagnosis(tmp_path / f"{name}.html", one, command="x")
         texts.append(checked(tmp_path / f"{name}.html")[0])
-    assert not any(word in texts[0] for word in ("Blue:", "Yellow:", "Green bar:"))
-    assert "Blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
+    assert not any(word in texts[0] for word in ("Light blue:", "Yellow:", "Green bar:"))
+    bars = [re.findall(r"Blue bar: the phase of the answer's cell \(([^)]*)\)", text) for text in texts]
+    assert bars == [["in hover, 0-0.5 Hz, forward force"], []]
+    assert "Light blue: take-off and landing." in texts[1] and "Green bar: the effect acts." in texts[1]
+
+
+def test_captions_say_what_before_and_after_are_where_there_is_an_after(pushed_flights, tmp_path):
+    """Below the signal and below the spectra."""
+    result = of_flights(pushed_flights[:1])
+    signal, spectra = result.curves.signal, result.curves.spectra
+    alone = replace(result.curves, signal=replace(signal, after=None),
+                    spectra=tuple(replace(s, after=None) for s in spectra))
+    for curves, times in ((result.curves, 2), (replace(alone, signal=signal), 1), (replace(alone, spectra=spectra), 1),
+                          (alone, 0)):
+        gap_report.write_diagnosis(tmp_path / "gap.html", replace(result, curves=curves), command="x", force=True)
+        text, _ = checked(tmp_path / "gap.html")
+        assert text.count("without and with the named effects in the model") == times
+        assert "Mean over the flights (40 of them if there are more)." in text
 
 
 def test_a_floor_of_the_spectra_is_explained_where_one_is_drawn(pushed_flights, tmp_path):

@@ -36,6 +36,18 @@ def test_a_vector_file_has_the_size_of_the_figure_and_its_text_as_glyphs_that_jo
     assert b"/MediaBox [ 0 0 288 216 ]" in pdf and b"/FontFile2" in pdf and b"/Type3" not in pdf
 
 
+def test_a_pdf_that_its_user_saves_has_no_font_of_type_3(tmp_path):
+    """Nor one that is restyled first. An SVG with text as text, which a user asks for, stays so."""
+    figure = drawn()
+    figure.axes[0].set_title("other")
+    figure.savefig(tmp_path / "a.pdf", bbox_inches="tight")
+    pdf = (tmp_path / "a.pdf").read_bytes()
+    assert b"/FontFile2" in pdf and b"/Type3" not in pdf
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        figure.savefig(tmp_path / "a.svg")
+    assert "other</text>" in (tmp_path / "a.svg").read_text()
+
+
 @pytest.mark.parametrize("room", [None, style.Room(0.5, 0.5, 0.3)])
 def test_a_figure_that_is_saved_by_its_user_looks_as_in_the_page(room):
     """Ticks are made when a figure is saved, as many as fit: with a larger font there would be fewer."""
@@ -99,3 +111,20 @@ def test_a_curve_within_its_pane_has_no_mark():
     ax.plot(np.sin(np.arange(2000)))
     style.limit(ax, np.sin(np.arange(2000)))
     assert len(ax.get_lines()) == 1
+
+
+@pytest.mark.parametrize(("limits", "above", "below"), [
+    ((-10.0, 10.0), [], []), ((-10.0, 5.0), [50], []), ((10.0, -4.0), [80], []), ((10.0, -10.0), [], []),
+    ((-4.0, 5.0), [50], [80])])
+def test_marks_are_those_of_the_limits_that_the_user_sets(limits, above, below):
+    """Of a spike up and one down; also upside down. A line across the whole pane leaves it nowhere."""
+    y = np.where(np.arange(1000) == 50, 8.0, np.where(np.arange(1000) == 80, -6.0, np.sin(np.arange(1000))))
+    figure, ((ax,),) = style.panes(SIZE_IN)
+    ax.plot(y)
+    style.limit(ax, y)
+    ax.axvline(500.0, color="black")
+    ax.set_ylim(limits)
+    assert (marks(ax, "^"), marks(ax, "v")) == (above, below)
+    ax.autoscale()
+    figure.draw_without_rendering()
+    assert (marks(ax, "^"), marks(ax, "v")) == ([], []) and max(ax.get_ylim()) > 8.0

@@ -47,7 +47,7 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     from airtouch.detector.evaluation.evaluate import remarks
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
-    picture = out if out.suffix in PICTURES else out.with_suffix(".png")
+    picture = out if out.suffix.lower() in PICTURES else out.with_suffix(".png")
     out = out.with_suffix(".geojson") if out == picture else out
     for path in (out, picture):
         check_free(path, force)

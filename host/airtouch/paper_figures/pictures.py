@@ -8,7 +8,7 @@ import numpy as np
 from airtouch.detector.evaluation.score import FlightScore
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.report.evaluation_figures import COLOURS
-from airtouch.report.style import GREY, image, style
+from airtouch.report.style import GREY, PlotFigure, image, style
 
 PAPER = "#444444"  #: colour of the paper's figures in every plot
 WIDTH_IN, HEIGHT_IN = 6.4, 3.8
@@ -16,10 +16,8 @@ WIDTH_IN, HEIGHT_IN = 6.4, 3.8
 
 def render(draw: Any) -> tuple[bytes, bytes]:
     """(PNG, SVG) of a figure that `draw` fills."""
-    from matplotlib.figure import Figure
-
     with style({"figure.dpi": 130}):
-        canvas = Figure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
+        canvas = PlotFigure(figsize=(WIDTH_IN, HEIGHT_IN), layout="constrained")
         draw(canvas)
         return image(canvas), image(canvas, "svg")
 

@@ -82,7 +82,7 @@ def reliability(curves: Mapping[str, Reliability]) -> Figure:
                 ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name),
                            label=f"{name}, ECE {curve.ece:.3f}")
         ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="fraction truly over",
-               title="Reliability; a dot's area is its fraction of the samples")
+               title="Reliability; the larger a dot, the more samples")
         ax.legend(loc="upper left", frameon=False)
     return figure
 
@@ -183,8 +183,8 @@ def _range(ax: Axes, plotted: PlottedFlight) -> None:
 
 
 def _finish(ax: Axes, label: str, values: np.ndarray, legend: bool = True) -> None:
-    """Set the label, and the limits by the values; with a legend unless it says not."""
-    limit(ax, values)
+    """Set the label, and the limits by the values, (n,) or (n, curves); with a legend unless it says not."""
+    limit(ax, *np.atleast_2d(values.T))
     ax.set_ylabel(label, fontsize=8)
     if legend:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 0.95), ncols=3, fontsize=7, frameon=False, borderpad=0.1)

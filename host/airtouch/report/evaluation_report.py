@@ -38,7 +38,7 @@ def write_report(
         columns=COLUMNS, cell=cell, breakdowns=scored.breakdowns,
         errors=embedded(figures.error_distribution(scored.hits)),
         reliability=embedded(figures.reliability(scored.reliability)),
-        flights=[{"name": f.score.file, "text": in_words(f.score),
+        flights=[{"name": f.score.file, "text": f"{first}: {in_words(f.score)}",
                   "image": embedded(figures.flight(f.log, f.trace, f.edges, f.others, first))} for f in scored.flights],
         parameters=parameters, command=command, version=__version__, left_out=left_out)
     write_bytes(page.encode(), path, force)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter, StrMethodFormatter
 
 from airtouch.gap.answer.curves import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
@@ -22,6 +22,8 @@ FLOOR_LINE = "#3f444d"  #: a darker grey, of the floor's outline in front of den
 ABOVE = 2.5  #: zorder of the measured curve and of the floor, above that of lines, 2: a dense curve would hide them
 #: look of the seconds in which an effect acts: a bar along the upper end of a pane
 ACTS: dict[str, Any] = {"facecolor": AFTER, "ymin": 0.96, "lw": 0.0, "zorder": ABOVE}
+#: look of the seconds in the phase of the answer's cell: a bar along the lower end of a pane
+ANSWER: dict[str, Any] = {"facecolor": BLUE, "ymax": 0.04, "lw": 0.0, "zorder": ABOVE}
 SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` for the axis of a signal; chosen
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
@@ -61,7 +63,7 @@ def signals(signal: Signal) -> Figure:
         axes[-1].set_xlabel("time, s")
         limit(gap, *gaps, -signal.floor, signal.floor, **SIGNAL_LIMITS)
         for ax in axes:
-            _phases(ax, signal.time_s, signal.phase)
+            _phases(ax, signal)
             for begin, end in signal.acts_s:
                 ax.axvspan(begin, end, **ACTS)
             ax.margins(x=0)
@@ -123,7 +125,8 @@ def _legend(figure: Figure, axes: np.ndarray) -> None:
 def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     """Set plain ticks, Hz, on the frequency axis that the panes share."""
     for ax in axes:
-        ax.set_xticks(ticks, [f"{t:g}" for t in ticks])
+        ax.set_xticks(ticks)
+        ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
         _power_axis(ax)
     axes[-1].set_xlabel("frequency, Hz")
@@ -146,8 +149,10 @@ def _power_axis(ax: Axes) -> None:
 
 
 def power_of_ten(x: float, _place: int | None = None) -> str:
-    """The label of a tick of a log axis: 10⁻³. That of matplotlib needs its parser of formulas, a second to begin."""
-    return "10" + f"{round(np.log10(x))}".translate(SUPERSCRIPT)
+    """The label of a tick of a log axis: 10⁻³, 2·10⁻³. Matplotlib's needs its parser of formulas, a second to begin."""
+    factor, exponent = f"{x:.2e}".split("e")
+    power = "10" + f"{int(exponent)}".translate(SUPERSCRIPT)
+    return power if float(factor) == 1.0 else f"{float(factor):g}·{power}"
 
 
 def _unit(unit: str) -> str:
@@ -155,8 +160,9 @@ def _unit(unit: str) -> str:
     return unit.replace("^2", "²")
 
 
-def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
-    """Shade take-off, landing and platforms behind the curves."""
+def _phases(ax: Axes, signal: Signal) -> None:
+    """Shade take-off, landing and platforms behind the curves, and mark the phase of the answer's cell."""
+    time_s, phase = signal.time_s, signal.phase
     bounds = np.r_[0, np.flatnonzero(np.diff(phase)) + 1, len(phase)]
     for a, b in zip(bounds[:-1], bounds[1:] - 1, strict=True):
         kind = KINDS[phase[a]]
@@ -165,3 +171,5 @@ def _phases(ax: Axes, time_s: np.ndarray, phase: np.ndarray) -> None:
             if b - a > 0.15 * len(phase):
                 ax.text((time_s[a] + time_s[b]) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
                         va="top", fontsize=8, color=GREY)
+        if signal.cell is not None and kind == signal.cell.phase:
+            ax.axvspan(time_s[a], time_s[b], **ANSWER)

@@ -27,7 +27,7 @@ from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signals.channels import CHANNEL_WORDS
 from airtouch.gap.where import summary
 from airtouch.gap.where.cell import Cell
-from airtouch.gap.where.cell_words import remaining_in_words
+from airtouch.gap.where.cell_words import place_in_words, remaining_in_words
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.segments import KINDS
 from airtouch.report import gap_tables
@@ -40,6 +40,7 @@ NO_PLOTS = "Pictures are left out, because matplotlib is not installed: pip inst
 ANCHOR = "add-an-effect"  #: anchor of the page's section on adding an effect
 #: what the grey lines are in the plot of a signal
 FLOOR_DRAWN = "Between the dark grey lines: the floor in this band (rms) in each phase."
+BEFORE_AFTER = "Before and after: without and with the named effects in the model."
 #: in the plot of a signal, by `style.limit`
 AXIS_LIMITS = "An axis holds the middle 99 % of each curve; a triangle at its edge is where a curve leaves it."
 PLOTS = ("signal", "spectra", "commands")  #: names of the page's plots, in its order
@@ -174,9 +175,12 @@ def _plots(curves: Curves | None) -> list[Plot]:
     if curves.signal is not None:
         signal = curves.signal
         phases = {KINDS[kind] for kind in np.unique(signal.phase)}
-        caption = [f"Flight {Path(signal.flight).name}.",
+        caption = [f"Flight {Path(signal.flight).name}.", *([curves.remark] if curves.remark else []),
+                   *([BEFORE_AFTER] if signal.after is not None else []),
                    *([FLOOR_DRAWN] if np.isfinite(signal.floor).any() else []),
-                   *(["Blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
+                   *([f"Blue bar: the phase of the answer's cell ({place_in_words(signal.cell)})."]
+                     if signal.cell is not None and signal.cell.phase in phases else []),
+                   *(["Light blue: take-off and landing."] if phases & {"take-off", "landing"} else []),
                    *(["Yellow: over a platform."] if "over platform" in phases else []),
                    *(["Green bar: the effect acts."] if signal.acts_s else []),
                    *_curves_of_a_random_effect(curves), AXIS_LIMITS]
@@ -184,14 +188,18 @@ def _plots(curves: Curves | None) -> list[Plot]:
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
-        text = f"Mean over the flights, of more than {MOST_FLIGHTS} over the first. "
+        text = f"Mean over the flights ({MOST_FLIGHTS} of them if there are more). "
+        text += f"{curves.remark} " if curves.remark else ""
+        if any(spectrum.after is not None for spectrum in curves.spectra):
+            text += f"{BEFORE_AFTER} "
         if any(spectrum.floor is not None for spectrum in curves.spectra):
             text += "Floor: the same of the baseline flights; with few or none, the noise of the sensors. "
         text += "The lowest frequency holds a part of a constant gap."
         if curves.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
-                     "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
-                     "counts as gap.")
+                     "the ratio of the power to the expected one. Below the floor it predicts too much. The map counts "
+                     "as gap what each block of about 2.6 s differs from the expected power, by chance too, so there "
+                     "a cell may stay where this curve is at the floor.")
         plots.append(Plot("spectra", "Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, curves.frequency_hz, curves.spectra)))
     if curves.commands is not None:

@@ -26,7 +26,17 @@ FORMATS: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": 
 FILE_STYLE: Any = {"svg.hashsalt": "airtouch", "pdf.fonttype": 42}
 
 OUTSIDE = 3  #: zorder of the marks of what is outside a pane, above that of lines, 2
+MARK = "outside"  #: gid of these marks
 TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
+
+
+class PlotFigure(Figure):
+    """A figure whose files have FILE_STYLE, whoever saves them."""
+
+    def savefig(self, *args: Any, **settings: Any) -> None:
+        """Save it as `Figure.savefig` does."""
+        with matplotlib.rc_context(FILE_STYLE):
+            super().savefig(*args, **settings)
 
 
 class Room(NamedTuple):
@@ -46,7 +56,7 @@ def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: R
     size_in: width and height, inch. room: fixes the layout, and all panes share the x axis, so that there is room below
     the lowest alone; without, matplotlib finds the layout, for which it draws twice. subplots: as in `Figure.subplots`.
     """
-    figure = Figure(figsize=size_in, layout=None if room else "constrained")
+    figure = PlotFigure(figsize=size_in, layout=None if room else "constrained")
     if room:
         subplots = {"sharex": True, "gridspec_kw": _grid(size_in, rows, columns, room), **subplots}
     axes = figure.subplots(rows, columns, squeeze=False, **subplots)
@@ -74,8 +84,7 @@ def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[No
 def image(figure: Figure, form: str = "png") -> bytes:
     """The figure as the bytes of an image file, in one of FORMATS."""
     buffer = io.BytesIO()
-    with matplotlib.rc_context(FILE_STYLE):
-        figure.savefig(buffer, format=form, metadata=FORMATS[form])
+    figure.savefig(buffer, format=form, metadata=FORMATS[form])
     return buffer.getvalue()
 
 
@@ -91,8 +100,9 @@ def write_image(figure: Figure, path: Path, force: bool = False) -> None:
 def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e-9) -> None:
     """Set the y limits to hold the middle 99 % of each of the values, so that a hard landing does not set the scale.
 
-    Where a line of the pane leaves these limits, a triangle at the pane's edge marks it. margin: above and below, as a
-    fraction of that range. least: range of values that hardly differ. Values that are not finite do not count.
+    Where a line of the pane leaves these limits, or others that are set later, a triangle at the pane's edge marks it.
+    margin: above and below, as a fraction of that range. least: range of values that hardly differ. Values that are not
+    finite do not count.
     """
     finite = [v[np.isfinite(v)] for v in values]
     ends = [np.percentile(v, [0.5, 99.5]) for v in finite if len(v)]
@@ -100,17 +110,25 @@ def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e
         low, high = np.min(ends), np.max(ends)
         pad = margin * max(high - low, least)
         ax.set_ylim(low - pad, high + pad)
-        for line in list(ax.get_lines()):
-            _mark_outside(ax, line)
+        _mark_outside(ax)
+        ax.callbacks.connect("ylim_changed", _mark_outside)
 
 
-def _mark_outside(ax: Axes, line: Line2D) -> None:
-    """Mark each stretch of a line outside the pane by a triangle at the pane's edge, where it is farthest out."""
-    x, y = np.asarray(line.get_xydata()).T
-    low, high = ax.get_ylim()
-    for edge, marker, beyond in ((1.0, "^", y - high), (0.0, "v", low - y)):
-        bounds = np.flatnonzero(np.diff(beyond > 0.0, prepend=False, append=False))
-        farthest = [a + int(np.argmax(beyond[a:b])) for a, b in bounds.reshape(-1, 2)]
-        if farthest:
-            ax.plot(x[farthest], np.full(len(farthest), edge), marker, transform=ax.get_xaxis_transform(),
-                    color=line.get_color(), ms=4, mew=0, clip_on=False, zorder=OUTSIDE)
+def _mark_outside(ax: Axes) -> None:
+    """Mark each stretch of a line outside the pane by a triangle at the pane's edge, where it is farthest out.
+
+    The marks of earlier limits are removed.
+    """
+    for mark in [line for line in ax.get_lines() if line.get_gid() == MARK]:
+        mark.remove()
+    bottom, top = ax.get_ylim()
+    for line in [line for line in ax.get_lines() if line.get_transform() == ax.transData]:
+        x, y = np.asarray(line.get_xydata()).T
+        height = (y - bottom) / (top - bottom)
+        for edge, marker, beyond in ((1.0, "^", height - 1.0), (0.0, "v", -height)):
+            bounds = np.flatnonzero(np.diff(beyond > 0.0, prepend=False, append=False))
+            farthest = [a + int(np.argmax(beyond[a:b])) for a, b in bounds.reshape(-1, 2)]
+            if farthest:  # not by `plot`, which asks for new limits
+                ax.add_line(Line2D(x[farthest], np.full(len(farthest), edge), linestyle="", marker=marker, gid=MARK,
+                                   transform=ax.get_xaxis_transform(), color=line.get_color(), ms=4, mew=0,
+                                   clip_on=False, zorder=OUTSIDE))

@@ -40,7 +40,7 @@ def test_signal_is_that_of_the_cell():
     drawn = curves_with(flight(SECONDS, FORWARD, name="pushed.csv")).signal
     assert (drawn.flight, drawn.channel, drawn.unit) == ("pushed.csv", "force_x", "m/s^2")
     np.testing.assert_allclose(drawn.time_s, TIME_S)
-    assert drawn.phase.shape == TIME_S.shape and drawn.after is None
+    assert drawn.phase.shape == TIME_S.shape and drawn.after is None and drawn.cell == LOWEST
 
 
 def test_floor_of_the_signal_is_the_root_of_the_summed_squares_of_its_bands_phase_by_phase():
@@ -135,11 +135,35 @@ def test_lost_rows_are_not_drawn_and_change_nothing_beside_them(band_hz, constan
 
 
 def test_flight_of_the_signal_is_that_of_the_median_gap():
-    """By the standard deviation in the cell's channel; in another channel their order is another."""
+    """By the rms in the cell's channel; in another channel their order is another."""
     noisy_flights = [flight(SECONDS, noise(SECONDS, 1.0, i) * [forward, 0.0, up], name=str(forward))
             for i, (forward, up) in enumerate([(3.0, 1.0), (1.0, 2.0), (2.0, 3.0)])]
     assert curves_with(*noisy_flights).signal.flight == "2.0"
     assert curves_with(*noisy_flights, cells=[cell("force_z", "hover", 1.0)]).signal.flight == "1.0"
+
+
+@pytest.mark.parametrize(("band_hz", "flown"), [((0.0, 0.5), "constant 2"), ((0.5, 2.0), "constant 0"),
+                                                ((2.0, 6.0), "constant 4")])
+def test_the_median_is_that_of_the_gap_in_the_cells_band(band_hz, flown):
+    """Of constant gaps with pushes at 1 and 4 Hz, in m/s^2; the noise of all is in an order of its own."""
+    def push(constant, slow, fast, i):
+        of_axis = constant + slow * np.sin(2.0 * np.pi * TIME_S) + fast * np.sin(8.0 * np.pi * TIME_S)
+        return of_axis[:, None] * [1.0, 0.0, 0.0] + noise(SECONDS, 0.1 * i, i)
+
+    pushed = [flight(SECONDS, push(*gaps), name=f"constant {gaps[0]}")
+              for gaps in ((2, 0.5, 4.0, 1), (4, 1.5, 3.0, 2), (0, 1.0, 2.0, 3))]
+    assert curves_with(*pushed, cells=[cell("force_x", "hover", 1.0, band_hz=band_hz)]).signal.flight == flown
+
+
+@pytest.mark.parametrize(("phase", "flown"), [("over platform", "0"), ("hover", "3"), ("landing", "1")])
+def test_the_median_is_that_of_the_gap_in_the_cells_phase(phase, flown):
+    """Of five flights three cross a platform, where their gap is another. None lands: then it is that in the air."""
+    crossing = (TIME_S > 6.0) & (TIME_S < 9.0)
+    flights = [flight(SECONDS, np.where(crossing, there, elsewhere)[:, None] * [1.0, 0.0, 0.0], name=str(i),
+                      phase=np.where(crossing & crosses, KINDS.index("over platform"), KINDS.index("hover")))
+               for i, (elsewhere, there, crosses) in enumerate([
+                   (0.0, 1.0, True), (2.0, 0.8, True), (1.0, 5.0, True), (1.5, 1.5, False), (9.0, 9.0, False)])]
+    assert curves_with(*flights, cells=[cell("force_x", phase, 1.0)]).signal.flight == flown
 
 
 def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
@@ -149,6 +173,16 @@ def test_flight_of_a_passing_effect_is_one_in_which_it_acts():
     drawn = curves_with(*flights, effects=[passing]).signal
     assert (drawn.flight, drawn.acts_s) == ("3.0", ((2.0, 4.0),))
     assert curves_with(*flights, effects=[bias(0.4)]).signal.flight == "2.0"
+
+
+@pytest.mark.parametrize(("phase", "gate"), [("hover", (("last", 1.0, 2.0),)), ("landing", ())])
+def test_the_one_flight_that_can_be_drawn_is_though_it_is_the_last_of_many(phase, gate):
+    """The 41st is the one in which the effect acts, or that lands."""
+    phases = np.repeat([KINDS.index("hover"), KINDS.index(phase)], 100)
+    flights = [*(flight(2.0, noise(2.0, 1.0, i), name=str(i)) for i in range(40)),
+               flight(2.0, FORWARD, name="last", phase=phases)]
+    drawn = curves_with(*flights, effects=[replace(bias(0.4), gate=gate)], cells=[cell("force_x", phase, 0.5)]).signal
+    assert drawn.flight == "last" and drawn.acts_s == tuple(act[1:] for act in gate) and drawn.after is not None
 
 
 def test_an_effect_that_changes_no_sample_has_no_curve_after():

@@ -16,6 +16,7 @@ from airtouch.gap.balance.hover_ranking import closes_too_little, ranking_of, wi
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.result import FITTED, Closure, Quantity
 from airtouch.logs.flight_log import VELOCITY
+from airtouch.report import gap_report
 from airtouch.simulation import effects
 from gap_flights import VEHICLE, flight, noise
 
@@ -118,6 +119,18 @@ def hovering(seed, lift=1.0):
     level = np.interp(lift * VEHICLE.thrust(np.array([40000.0]))[0], VEHICLE.thrust(commands), commands)
     pwm = level + np.random.default_rng(seed).normal(0.0, 300.0, made.pwm.shape)
     return replace(made, rates=None, log=made.log.with_columns(dict.fromkeys(VELOCITY, np.zeros(len(made)))), pwm=pwm)
+
+
+def test_captions_say_that_the_gap_drawn_is_another_than_that_of_the_answer(tmp_path):
+    """The rotors of nominal flights give a fifth more than declared, those of the flight three tenths more."""
+    pytest.importorskip("matplotlib")
+    nominal = [hovering(seed, lift) for seed, lift in ((1, 1.19), (2, 1.2), (3, 1.21))]
+    result = balance_result.diagnosis([hovering(4, 1.3)], nominal, VEHICLE, curves=True)
+    assert result.headline.channel == "force_z" and result.headline.gap < 1.2  # m/s^2
+    declared = 4.0 * VEHICLE.thrust(np.array([40000.0]))[0] / VEHICLE.mass_kg
+    assert np.nanmean(result.curves.signal.before) == pytest.approx(-0.3 * declared, rel=0.05)
+    gap_report.write_diagnosis(tmp_path / "hover.html", result, command="x")
+    assert (tmp_path / "hover.html").read_text().count(balance_result.OTHER_GAP) == 2  # of the signal and the spectra
 
 
 def test_hovers_are_judged_where_no_flight_has_a_gyro_and_both_kinds_hover():

@@ -1,6 +1,6 @@
 """The curves of a report: signals of the headline's cell, spectra, commands."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,7 +25,8 @@ from airtouch.simulation import signals as at
 
 GROUND_EFFECT = "ground_effect"  #: the effect beside whose signal the height is drawn
 SAME = 1e-6  #: of the largest value: less is no difference between two curves; chosen
-MOST_FLIGHTS = 40  #: flights from which the curves are made, the first ones; chosen for time
+#: flights from which the curves are made, first those that can be drawn as the signal; chosen for time
+MOST_FLIGHTS = 40
 MOST_SPECTRA = 3  #: channels whose spectra are drawn; chosen. A larger number makes a report longer
 #: lowest cutoff of a signal that is drawn: the lowest band alone is nearly a constant; chosen, the end of the second
 LEAST_CUTOFF_HZ = 2.0
@@ -52,7 +53,7 @@ class Signal:
     the latter None without effects, and of one at random that has no mean; phase: of each sample, a place in
     `segments.KINDS`; floor: rms of the floor in that band and the sample's phase, NaN where the map does not have it;
     height_m: of the rotors over the ground below, None where no effect of the ground is named or it is not known;
-    acts_s: begin and end, s, of each stretch in which a passing effect acts.
+    acts_s: begin and end, s, of each stretch in which a passing effect acts; cell: that of the answer.
     """
 
     flight: str
@@ -67,6 +68,7 @@ class Signal:
     floor: np.ndarray
     height_m: np.ndarray | None = None
     acts_s: tuple[tuple[float, float], ...] = ()
+    cell: Cell | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ class Curves:
 
     signal: of the headline's cell, None without one and where no flight has its channel; frequency_hz (bins,): of the
     spectra; commands: None where no flight has a steady stretch; random: whether an effect that acts at random is
-    among those named.
+    among those named; remark: in what the gap that is drawn is another than that of the answer, a sentence, "" where it
+    is the same.
     """
 
     signal: Signal | None = None
@@ -98,6 +101,7 @@ class Curves:
     spectra: tuple[Spectrum, ...] = ()
     commands: MeanSpectra | None = None
     random: bool = False
+    remark: str = ""
 
 
 def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight], effects: Sequence[Term],
@@ -106,16 +110,20 @@ def curves_of(study: Study, flights: Sequence[Flight], nominal: Sequence[Flight]
 
     cells: the one that its answer speaks of, whose signal is drawn, then others, whose channels' spectra are drawn too;
     without any, the commands are all. whole_map: every cell of the map, whose floors are drawn.
+
+    Of more than MOST_FLIGHTS flights those that have the phase of that cell come first, of these those in which a
+    passing effect acts.
     """
     commands = mean_spectra(*([command_power(f, study.vehicle) for f in some] for some in (flights, nominal)))
     if not cells or not flights:
         return Curves(commands=commands)
     active = [t.active() for t in mean_of(effects)]
-    residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None)
-            for f in flights[:MOST_FLIGHTS]]
-    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
     gated = {name for t in effects for name, *_ in t.gate}  # flights in which a passing effect acts
-    median = _median_residual([r for r in residuals if r.flight.name in gated] or residuals, cells[0].channel)
+    phase = KINDS.index(cells[0].phase)
+    chosen = sorted(flights, key=lambda f: (phase not in f.phase, f.name not in gated))[:MOST_FLIGHTS]
+    residuals = [FlightResidual(f, study.residual(f), study.residual(f, active) if active else None) for f in chosen]
+    channels = list(dict.fromkeys(c.channel for c in cells))[:MOST_SPECTRA]
+    median = _median_residual(residuals, cells[0], gated)
     signal = None if median is None else _signal(median, cells[0], whole_map, effects)
     return Curves(signal, frequencies(AIR), _spectra(study, residuals, nominal, effects, channels), commands,
                   bool(random_of(effects)))
@@ -134,11 +142,15 @@ def _signal(residual: FlightResidual, cell: Cell, whole_map: Sequence[Cell], eff
     return Signal(flight.name, cell.channel, band_hz, CHANNELS[c].unit, np.arange(len(flight)) * PERIOD_S,
                   flight.phase, measured, before, after, floor,
                   _height(flight) if any(t.name == GROUND_EFFECT for t in effects) else None,
-                  tuple((begin, end) for t in effects for name, begin, end in t.gate if name == flight.name))
+                  tuple((begin, end) for t in effects for name, begin, end in t.gate if name == flight.name), cell)
 
 
 def _band(cell: Cell, whole_map: Sequence[Cell]) -> tuple[float, float]:
-    """Band in which a cell's signal is drawn, Hz: its own; up to LEAST_CUTOFF_HZ where it and the map's others are."""
+    """The band in which a cell's signal is drawn, Hz: as a rule the cell's own.
+
+    It is 0 to LEAST_CUTOFF_HZ where the cell's band lies within that and the map has the channel in all bands there,
+    and where the cell's band is none of MAP_BANDS_HZ.
+    """
     low = [band for band in MAP_BANDS_HZ if band[1] <= LEAST_CUTOFF_HZ]
     in_map = {c.band_hz for c in whole_map if c.channel == cell.channel}
     own = cell.band_hz in MAP_BANDS_HZ and not (cell.band_hz in low and in_map.issuperset(low))
@@ -167,14 +179,22 @@ def _height(flight: Flight) -> np.ndarray | None:
     return np.where(flight.usable, flight.signals[:, at.HEIGHT], np.nan)
 
 
-def _median_residual(residuals: Sequence[FlightResidual], channel: str) -> FlightResidual | None:
-    """The residual whose standard deviation in a channel is the median; None where no flight has the channel.
+def _median_residual(residuals: Sequence[FlightResidual], cell: Cell, gated: Collection[str],
+                     ) -> FlightResidual | None:
+    """The residual whose rms in a cell's channel, band and phase is the median; None where no flight has the channel.
 
-    Flights that lack the channel do not count, nor does what is on the ground.
+    gated: names of the flights in which a passing effect acts. Flights that lack the phase do not count, nor do those
+    that are not gated, unless there are no others.
     """
-    in_air = [r.before[r.flight.usable & (r.flight.phase != GROUND), COLUMN[channel]] for r in residuals]
-    known = [(float(np.nanstd(values)), r) for values, r in zip(in_air, residuals, strict=True)
-             if np.isfinite(values).any()]
+    column, phase = COLUMN[cell.channel], KINDS.index(cell.phase)
+    band_hz = cell.band_hz if cell.band_hz in MAP_BANDS_HZ else (0.0, LEAST_CUTOFF_HZ)
+    gaps = [_band_passed(r.flight, r.before[:, column], band_hz) for r in residuals]
+    inside = [np.isfinite(gap) & (r.flight.phase == phase) for gap, r in zip(gaps, residuals, strict=True)]
+    if not any(here.any() for here in inside):
+        inside = [np.isfinite(gap) & (r.flight.phase != GROUND) for gap, r in zip(gaps, residuals, strict=True)]
+    known = [(float(np.mean(gap[here] ** 2)), r) for gap, here, r in zip(gaps, inside, residuals, strict=True)
+             if here.any()]
+    known = [pair for pair in known if pair[1].flight.name in gated] or known
     return sorted(known, key=lambda pair: pair[0])[len(known) // 2][1] if known else None
 
 

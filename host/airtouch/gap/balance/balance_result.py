@@ -41,6 +41,9 @@ from airtouch.gap.where.cell import BASELINE, Cell, GapMap
 from airtouch.simulation.effects import EFFECTS, NAMES
 from airtouch.vehicle import Vehicle
 
+#: of the curves of a report
+OTHER_GAP = ("The gap drawn is that to the vehicle as declared. That of the answer is to the means of the baseline "
+             "flights, so it is another.")
 BAND_HZ = (0.0, 0.2)  #: of a mean over a hover of 4 s or more, as its cells name it; chosen
 #: the first of these that is improbable is the wrong effect of the control; chosen, those that a hover shows
 #: (`signature.WRONG` has others)
@@ -113,8 +116,8 @@ def diagnosis(flights: Sequence[Flight], nominal: Sequence[Flight], vehicle: Veh
         cannot=cannot_of([f.cannot for f in flights]), flights=tuple(f.name for f in flights),
         map=GapMap(cells, BASELINE, tuple(f.name for f in flights)), headline=headline,
         vehicle=vehicle.name, baseline=tuple(f.name for f in nominal),
-        curves=curves_of(declared_study(vehicle, ()), flights, nominal, [],
-                           [headline, *cells] if headline else [], cells)
+        curves=replace(curves_of(declared_study(vehicle, ()), flights, nominal, [],
+                                 [headline, *cells] if headline else [], cells), remark=OTHER_GAP)
         if curves else None)
     return replace(answer, next=next_steps(answer, flights, vehicle, own_effects=False))
 
