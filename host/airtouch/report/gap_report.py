@@ -197,9 +197,8 @@ def _plots(curves: Curves | None) -> list[Plot]:
         text += "The lowest frequency holds a part of a constant gap."
         if curves.random:
             text += (" A random effect cannot be predicted sample by sample: its green curve is the floor times "
-                     "the ratio of the power to the expected one. Below the floor it predicts too much. The map counts "
-                     "as gap what each block of about 2.6 s differs from the expected power, by chance too, so there "
-                     "a cell may stay where this curve is at the floor.")
+                     "the ratio of the power to the expected one. Below the floor it predicts too much, which the map "
+                     "counts as gap.")
         plots.append(Plot("spectra", "Spectra of the gap in the air", text,
                           partial(gap_figures.spectra, curves.frequency_hz, curves.spectra)))
     if curves.commands is not None:
