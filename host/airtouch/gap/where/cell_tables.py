@@ -61,18 +61,18 @@ def table_of(all_sums: Sums, phase: int, seed: int) -> Table | None:
     mean_square, mean = part.mean_square(), part.offset()
     low, high = _bootstrap(part.weight, part.power, seed)
     seconds = weight.sum(axis=0) * PERIOD_S
-    freedom = degrees_of_freedom(seconds, blocks)
+    freedom = _freedom(seconds, blocks)
     least, most = (mean_square * freedom / chi_square(p / 100.0, freedom) for p in INTERVAL[::-1])
     least[:, 0], most[:, 0] = _offset(mean, mean_square[:, 0], freedom[:, 0])
     return Table(rms=np.sqrt(mean_square), low=np.sqrt(np.minimum(low, least)), high=np.sqrt(np.maximum(high, most)),
                  seconds=seconds, blocks=blocks, flights=flights)
 
 
-def degrees_of_freedom(seconds: np.ndarray, blocks: np.ndarray | float) -> np.ndarray:
-    """Degrees of freedom (..., bands, COUNT) of a mean square of noise: 2 x time x bandwidth.
+def _freedom(seconds: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """Degrees of freedom (regimes, bands, COUNT) of a mean square of noise: 2 x time x bandwidth.
 
-    A block has BLOCK_FREEDOM at most (Bendat and Piersol, Random Data, 4th ed., section 8.3). seconds (..., bands,
-    COUNT): of so many blocks.
+    A block has BLOCK_FREEDOM at most (Bendat and Piersol, Random Data, 4th ed., section 8.3). seconds, blocks: each
+    (regimes, bands, COUNT).
     """
     width = np.array([b - a for a, b in MAP_BANDS_HZ])[:, None]
     return np.clip(2.0 * seconds * width, 1.0, np.maximum(BLOCK_FREEDOM * blocks, 1.0))
