@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from airtouch import logs
@@ -10,7 +9,6 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.calibrate import calibrated
-from airtouch.logs.flight_log import PWM
 from airtouch.simulation.effects import EFFECTS
 from gap_flights import VEHICLE, fly, without_fits
 
@@ -87,25 +85,3 @@ def test_recorded_flights_whose_table_does_not_say_so_count_as_well(flights):
     study, calibration = calibrated(vehicle, baseline, without=[n for n in EFFECTS if n != "mass"])
     assert len(baseline) > 2 and not study.simulated
     assert not [n for n in calibration.notes if "left out" in n]
-
-
-def with_noisy_commands(flight, rms_pwm, rows, seed):
-    """The rows of the flight's log, its logged commands with white noise that no motor followed while they turned."""
-    generator = np.random.default_rng(seed)
-    columns = {k: v[rows] for k, v in flight.log.columns.items()}
-    columns |= {c: columns[c] + (columns[c] > 0.0) * generator.normal(0.0, rms_pwm, len(columns[c])) for c in PWM}
-    return ready(replace(flight.log, columns=columns), VEHICLE)
-
-
-@pytest.mark.parametrize("at_rest", [True, False])
-def test_thrust_is_right_where_logged_commands_are_noisy(nominal, at_rest):
-    """Regression dilution: noise of 4000 PWM makes the slope of lift over thrust a fifth too small; a bias fills in.
-
-    The truth is the simulator's vehicle, which is the declared one, without a bias.
-    """
-    rows = [slice(None) if at_rest else ((f.phase > 0) & f.usable).nonzero()[0] for f in nominal]
-    noisy = [with_noisy_commands(f, 4000.0, r, seed) for seed, (f, r) in enumerate(zip(nominal, rows, strict=True))]
-    _, calibration = calibrated(VEHICLE, noisy, scatter=False)
-    losses = [calibration.parameters[f"weak_motor {rotor} thrust_loss"].value for rotor in (1, 2, 3, 4)]
-    assert np.mean(losses) == pytest.approx(0.0, abs=0.01)
-    assert ("imu_bias acc_z" in calibration.parameters) == at_rest

@@ -6,9 +6,8 @@ arms, with the vehicle as declared and as calibrated here. Only the vehicle is c
 what thrust does, as aliases of the commands drown the torque (gap.signals.response). Inertia shows
 in the torque alone: it stays as declared.
 
-Logged commands are aliased, so what thrust does from moment to moment makes the rotors too weak (regression dilution):
-neural-swarm's by 7 to 16 %, with an accelerometer's bias of up to 1.4 m/s^2 to make up for it in the mean. All rotors
-together are therefore scaled to the mean, and a vertical bias is fitted only where a flight rests, which shows it.
+The thrust of all rotors together is that of the mean (`mean_thrust` says why), and a vertical bias of the accelerometer
+is fitted only where flights rest, which shows it.
 """
 
 from collections.abc import Sequence
@@ -19,20 +18,20 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
+from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.features.flight_features import features
-from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nameless.model import nameless_floor
 from airtouch.gap.nominal.apparent import baseline_scatter
 from airtouch.gap.nominal.build_study import declared_study, study_of
 from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, MOST_LEFT_OUT, odd_flights, split_unlike
 from airtouch.gap.nominal.kept_scatter import kept_scatter
+from airtouch.gap.nominal.mean_thrust import BIAS_STD, SEEN_AT_REST, lift_note, rest, with_mean_thrust
 from airtouch.gap.relations.library import library_for
 from airtouch.gap.result import Quantity
-from airtouch.gap.signals.channels import COLUMN, ReplayedFlight
 from airtouch.gap.signatures.candidates import all_candidates, terms
-from airtouch.gap.signatures.term import Term, Terms
+from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
@@ -44,10 +43,8 @@ PRIORS: tuple[tuple[str, dict[str, float], dict[str, float]], ...] = (
     ("motor_lag", {}, {"factor": 0.5}),
     ("actuator_delay", {}, {"delay": 0.005}),
     ("rotor_drag", {}, {"horizontal": 0.01, "vertical": 0.01}),
-    ("imu_bias", {}, {**{f"acc_{a}": 0.2 for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
+    ("imu_bias", {}, {**{f"acc_{a}": BIAS_STD for a in "xyz"}, **{f"gyro_{a}": 0.02 for a in "xyz"}}),
 )
-SEEN_AT_REST = "acc_z"  #: parameter of `imu_bias` that in the air looks like thrust
-SCALE_STEP = 0.01  #: fraction by which thrust is changed to see what its scale does to the lift; chosen
 VEHICLE_FITS = 2  #: fits of the vehicle, the second against the floor that the first leaves; chosen
 
 
@@ -88,8 +85,8 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     study, nominal = measured.study, measured.flights
     if study.simulated:
         study = _as_simulated(study, nominal, without)
-    return study, Calibration(study.calibration, _quantities(measured.fitted),
-                              (*left_out, *odd_flights(study, nominal)), tuple(nominal), measured.declared)
+    notes = (*left_out, *lift_note(vehicle, nominal, measured.fitted.terms), *odd_flights(study, nominal))
+    return study, Calibration(study.calibration, _quantities(measured.fitted), notes, tuple(nominal), measured.declared)
 
 
 class _Measured(NamedTuple):
@@ -114,42 +111,16 @@ def _measured(vehicle: Vehicle, flights: Sequence[Flight], scatter: bool, withou
 
 def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:
     """The study of the vehicle with the parameters of PRIORS fitted to nominal flights, and their fit."""
-    chosen, prior = _terms_and_priors(at_rest=any(f.on_ground.any() for f in flights))
+    known_bias = rest(flights)
+    chosen, prior = _terms_and_priors(known_bias)
     study = declared
     for _ in range(VEHICLE_FITS):
         data = Data(replace(study, calibration=(), loop=None, response=None), flights)
         start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
-        fitted = with_mean_thrust(declared.vehicle, flights, fit(data, whole_of(data), chosen, start, prior))
+        fitted = fit(data, whole_of(data), chosen, start, prior)
+        fitted = with_mean_thrust(declared.vehicle, flights, fitted, known_bias)
         study = study_of(declared.vehicle, tuple(t.active() for t in fitted.terms), flights)
     return study, fitted
-
-
-def with_mean_thrust(vehicle: Vehicle, flights: Sequence[Flight], fitted: FittedTerms) -> FittedTerms:
-    """The fit with the thrust of all rotors scaled alike, so that the mean of the flights in the air leaves no lift.
-
-    flights: each counts alike; fitted: PRIORS' terms with their values, fitted to the flights.
-    """
-    replayed = [(ReplayedFlight(f, vehicle), f.usable & (f.phase != GROUND)) for f in flights]
-    in_air = [(flight, air) for flight, air in replayed if air.any()]
-
-    def lift(of_terms: Terms) -> float:
-        active = [t.active() for t in of_terms]
-        return float(np.mean([flight.residual(active)[air, COLUMN["force_z"]].mean() for flight, air in in_air]))
-
-    if not in_air:
-        return fitted
-    left = lift(fitted.terms)
-    per_step = left - lift(_with_thrust_times(1.0 + SCALE_STEP, fitted.terms))
-    if per_step <= 0.0:  # no motor turns
-        return fitted
-    scaled = _with_thrust_times(1.0 + SCALE_STEP * left / per_step, fitted.terms)
-    return replace(fitted, terms=scaled, scaled=mean_parameters(scaled))
-
-
-def _with_thrust_times(factor: float, of_terms: Terms) -> Terms:
-    """Terms with the thrust of every rotor times a factor, within the bounds of the loss."""
-    return tuple(t.fitted(t.scaled({"thrust_loss": 1.0 - factor * (1.0 - t.values["thrust_loss"])}))
-                 if t.name == "weak_motor" else t for t in of_terms)
 
 
 def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str]) -> Study:
@@ -169,7 +140,7 @@ def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str
 def _terms_and_priors(at_rest: bool) -> tuple[list[Term], np.ndarray]:
     """The terms of PRIORS, and the standard deviation (k,) of each of their free parameters, in natural steps.
 
-    at_rest: whether a flight rests, so that a vertical bias of the accelerometer can be told from thrust.
+    at_rest: whether flights rest, so that a vertical bias of the accelerometer can be told from thrust.
     """
     chosen, prior = [], []
     for name, variant, spread in PRIORS:
