@@ -7,11 +7,13 @@ import pytest
 
 from airtouch.gap.flights.flight import GROUND, ready
 from airtouch.gap.nominal.calibrate import calibrated
+from airtouch.gap.signals.spectra import REST, starts
 from airtouch.logs.flight_log import PWM
 from gap_flights import VEHICLE, fly
 
 NOISE_PWM = 4000.0  #: rms of what is logged beside the commands that the motors followed
-AT_REST = {"all of it": 10 ** 6, "0.1 s": 10, "none": 0}  #: samples at rest that are kept of each log
+#: samples at rest that are kept of each log; a block at rest has 24 usable ones, and blocks overlap by half
+AT_REST = {"all of it": [10 ** 6] * 4, "four blocks": [70, 0, 0, 0], "three blocks": [58, 0, 0, 0], "none": [0] * 4}
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +40,12 @@ def losses(calibration):
 @pytest.mark.parametrize("at_rest", AT_REST)
 def test_thrust_is_right_where_logged_commands_are_noisy(nominal, at_rest):
     """Regression dilution: the noise makes the slope of lift over thrust a fifth too small; a bias fills in."""
-    noisy = [kept(f, AT_REST[at_rest], NOISE_PWM, seed=seed) for seed, f in enumerate(nominal)]
+    noisy = [kept(nominal[i], rows, NOISE_PWM, seed=i) for i, rows in enumerate(AT_REST[at_rest])]
+    blocks = sum(len(starts(f, REST)) for f in noisy)
+    assert blocks == {"none": 0, "three blocks": 3, "four blocks": 4}.get(at_rest, blocks)
     _, calibration = calibrated(VEHICLE, noisy, scatter=False)
-    assert np.mean([q.value for q in losses(calibration)]) == pytest.approx(0.0, abs=0.01)
-    assert ("imu_bias acc_z" in calibration.parameters) == (at_rest == "all of it")
+    assert np.mean([q.value for q in losses(calibration)]) == pytest.approx(0.0, abs=0.006)
+    assert ("imu_bias acc_z" in calibration.parameters) == (at_rest in ("all of it", "four blocks"))
 
 
 def test_intervals_hold_a_bias_that_no_flight_shows(nominal):

@@ -17,7 +17,7 @@ from airtouch.gap.signatures.candidates import mean_of, random_of, random_part_o
 from airtouch.gap.where.band_sums import block_sums
 from airtouch.gap.where.filter_bank import sensor_rms
 from airtouch.gap.where.gap_map import gap_map
-from airtouch.gap.where.random_power import random_power
+from airtouch.gap.where.random_power import SumsWith, random_power
 from airtouch.logs.segments import KINDS
 from gap_flights import HOVER, VEHICLE, flight, fly, study
 
@@ -220,3 +220,15 @@ def test_the_variance_of_the_power_is_that_of_pieces_of_noise():
     power = block_sums(made, drawn, VEHICLE).power[:, 0, 1:, 0]
     away = (power / power.mean(axis=0) - 1.0) ** 2 * mean ** 2 / variance
     assert len(away) > 80 and away.mean(axis=0) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(away)))
+
+
+def test_much_too_much_power_counts_as_gap_in_a_single_block_of_the_lowest_bands():
+    """Noise that is just as strong as on average leaves nothing of it, or, where it is taken four times, as much."""
+    made, noise = flight(2.56), with_values("imu_noise", factor=2.0)
+    mean, variance = (np.where(x > 0.0, x, np.nan) for x in random_power(study(), made, [noise]))
+    sums, no_noise = block_sums(made, np.zeros((len(made), 13)), VEHICLE), np.zeros(sensor_rms(VEHICLE).shape)
+    of_right, of_four = (SumsWith(*(replace(sums, power=x) for x in (mean, n * mean, n ** 2 * variance)))
+                         for n in (1.0, 4.0))
+    right, four = of_right.mean_square(no_noise), of_four.mean_square(no_noise)
+    of_block = of_right.gap.mean_square()
+    assert len(sums.phase) == 1 and np.all(right[0, :2, 0] == 0.0) and np.all(four[0, :2, 0] > of_block[0, :2, 0])

@@ -3,7 +3,8 @@
 Logged commands are aliased: the log has every fifth of them. What thrust does from moment to moment therefore makes the
 rotors too weak (regression dilution), and where nothing else shows the accelerometer's vertical bias, a false one makes
 up for that in the mean. neural-swarm's rotors came out 7 to 16 % too weak, with a bias of up to 1.4 m/s^2. The mean of
-the commands is not diluted.
+the commands is not diluted. Take-off and landing are left out of it: there a lag shows that is fitted too long, for the
+same reason.
 """
 
 from collections.abc import Sequence
@@ -13,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from airtouch.gap.evidence.fit import FittedTerms, mean_parameters
-from airtouch.gap.flights.flight import GROUND, Flight
+from airtouch.gap.flights.flight import Flight
 from airtouch.gap.signals.channels import COLUMN, ReplayedFlight
 from airtouch.gap.signals.spectra import REST, starts
 from airtouch.gap.signatures.term import Term, Terms
+from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle
 
 SEEN_AT_REST = "acc_z"  #: parameter of `imu_bias` that in the air looks like thrust
@@ -24,6 +26,7 @@ BIAS_STD = 0.2  #: standard deviation of an accelerometer's bias, m/s^2; BMI088:
 #: blocks at rest, of all flights together, from which on the bias is known; chosen: in simulated flights with noisy
 #: commands one was too few, two were enough
 FEWEST_AT_REST = 4
+NOT_IN_MEAN = [KINDS.index(kind) for kind in ("ground", "take-off", "landing")]  #: phases that the mean leaves out
 SCALE_STEP = 0.01  #: fraction by which thrust is changed to see what lift that makes; chosen
 #: mean lift, m/s^2, that the calibrated vehicle may leave before a note says so; chosen. A larger number says less
 MOST_LIFT_LEFT = 0.1
@@ -64,15 +67,15 @@ def lift_note(vehicle: Vehicle, flights: Sequence[Flight], terms: Terms) -> list
 
 
 class _InAir(NamedTuple):
-    """A flight for its replay, and the samples (n,) at which it is in the air."""
+    """A flight for its replay, and the samples (n,) at which it is in the air, after take-off and before landing."""
 
     flight: ReplayedFlight
     samples: np.ndarray
 
 
 def _in_air(vehicle: Vehicle, flights: Sequence[Flight]) -> list[_InAir]:
-    """The flights that are in the air at all."""
-    every = [_InAir(ReplayedFlight(f, vehicle), f.usable & (f.phase != GROUND)) for f in flights]
+    """The flights that are in the air for longer than take-off and landing."""
+    every = [_InAir(ReplayedFlight(f, vehicle), f.usable & ~np.isin(f.phase, NOT_IN_MEAN)) for f in flights]
     return [f for f in every if f.samples.any()]
 
 

@@ -23,8 +23,8 @@ from airtouch.gap.where.band_sums import Sums, block_sums, join, sums_over_block
 from airtouch.gap.where.filter_bank import MAP_BANDS_HZ, gains
 
 WITHIN_BIN = 16  #: frequencies at which the gains of the bands are averaged over a bin; chosen
-#: standard deviation of a block's power over its mean, at most; chosen. With more, a power that is twice too much would
-#: leave no gap in a short block
+#: standard deviation of a block's power over its mean, at most; chosen. White noise has more in the lowest band, 0.9 in
+#: 2.56 s. There a power of three times the right one leaves no gap in a single block; with 1, none would
 MOST_SCATTER = 0.7
 LEAST_WEIGHT = 1e-3  #: of blocks' windows, over the largest, below which they say nothing of a sample; chosen
 
@@ -51,8 +51,8 @@ class SumsWith:
 
         With a random part it is the noise of the sensors, noise (bands, COUNT), and the difference of the rest from the
         power expected; power that the random part has too much counts as gap. A power of noise in a limited time
-        scatters by chance: the variance of that is taken from the square of the difference, so that of a right random
-        part nothing is left in the mean of the squares. NaN where no row has the channel.
+        scatters by chance: the variance of that is taken from the square of the difference. So one standard deviation
+        of chance is no gap, and of a right random part a cell in three has some left. NaN where no row has the channel.
         """
         square = self.gap.mean_square()
         if self.random is None or self.chance is None:
