@@ -3,6 +3,7 @@
 import xml.etree.ElementTree as ElementTree
 
 import matplotlib
+import matplotlib.image
 import numpy as np
 import pytest
 
@@ -83,8 +84,10 @@ def test_panes_of_a_fixed_layout_leave_the_room_that_was_asked_for():
 
 
 def marks(ax, marker):
-    """Places in x of the marks at an edge of the pane."""
-    return [x for line in ax.get_lines() if line.get_marker() == marker for x in line.get_xdata()]
+    """Places in x of the marks at an edge of the pane, rounded to samples."""
+    return [round(ax.transData.inverted().transform(point)[0])
+            for line in style.marks_outside(ax) if line.get_marker() == marker
+            for point in line.get_transform().transform(line.get_xydata())]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -101,16 +104,16 @@ def test_where_a_curve_leaves_its_pane_a_mark_shows_its_farthest_point(sign):
     above, below = ("^", "v") if sign > 0.0 else ("v", "^")
     assert (marks(ax, above), marks(ax, below)) == ([11, 21], [31])
     ends = {marker: ax.transAxes.inverted().transform(line.get_transform().transform(line.get_xydata()))[:, 1]
-            for line in ax.get_lines()[1:] for marker in (line.get_marker(),)}
+            for line in style.marks_outside(ax) for marker in (line.get_marker(),)}
     assert set(ends["^"]) == {1.0} and set(ends["v"]) == {0.0}
-    assert {line.get_color() for line in ax.get_lines()} == {"red"}
+    assert {line.get_color() for line in style.marks_outside(ax)} == {"red"}
 
 
 def test_a_curve_within_its_pane_has_no_mark():
     _, ((ax,),) = style.panes(SIZE_IN)
     ax.plot(np.sin(np.arange(2000)))
     style.limit(ax, np.sin(np.arange(2000)))
-    assert len(ax.get_lines()) == 1
+    assert not style.marks_outside(ax)
 
 
 @pytest.mark.parametrize(("limits", "above", "below"), [
@@ -128,3 +131,64 @@ def test_marks_are_those_of_the_limits_that_the_user_sets(limits, above, below):
     ax.autoscale()
     figure.draw_without_rendering()
     assert (marks(ax, "^"), marks(ax, "v")) == ([], []) and max(ax.get_ylim()) > 8.0
+
+
+def drawn_marks(figure):
+    """Places of the marks in the SVG of a figure, as fractions of its one pane."""
+    name = "{http://www.w3.org/2000/svg}"
+    root = ElementTree.fromstring(style.image(figure, "svg"))
+    points = [(float(use.get("x")), float(root.get("height").removesuffix("pt")) - float(use.get("y")))
+              for group in root.iter(f"{name}g") if group.get("id") == style.MARK for use in group.iter(f"{name}use")]
+    (x0, y0), (x1, y1) = figure.axes[0].get_position().get_points() * figure.get_size_inches() * 72.0
+    return [((x - x0) / (x1 - x0), (y - y0) / (y1 - y0)) for x, y in points]
+
+
+def spiked(scale="linear", room=None):
+    """A figure of a sine with a spike up at 50 and one down at 700, all of it over 0."""
+    y = 20.0 + np.sin(np.arange(1000))
+    y[50], y[700] = 400.0, 1.0
+    with style.style():
+        figure, ((ax,),) = style.panes(SIZE_IN, room=room)
+        ax.plot(y)
+        style.limit(ax, y)
+        ax.margins(x=0)
+        ax.set_yscale(scale)
+    return figure
+
+
+@pytest.mark.parametrize("scale", ["linear", "log"])
+@pytest.mark.parametrize("room", [None, style.Room(0.5, 0.5, 0.3)])
+@pytest.mark.parametrize(("x_limits", "y_limits", "places"), [
+    ((0, 100), None, [(0.5, 1.0)]), ((100, 0), None, [(0.5, 1.0)]), ((400, 500), None, []),
+    ((0, 1000), None, [(0.05, 1.0), (0.7, 0.0)]), ((25, 75), (2.0, 1.0), [(0.5, 0.0)])])
+def test_marks_are_at_the_edges_of_the_pane_whatever_its_limits(scale, room, x_limits, y_limits, places):
+    """The last has the whole curve below a pane that is upside down; the spike is farthest."""
+    figure = spiked(scale, room)
+    (ax,) = figure.axes
+    ax.set(xlim=x_limits, **({"ylim": y_limits} if y_limits else {}))
+    assert sorted(drawn_marks(figure)) == [pytest.approx(place, abs=0.002) for place in places]
+    assert drawn_marks(figure) == drawn_marks(figure)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("limits", [(400, 500), (0, 20)])
+def test_a_figure_with_other_limits_keeps_its_size(limits, tmp_path):
+    """Trimmed to what is drawn, within 0.1 inch, as labels of ticks may stick out."""
+    widths = []
+    for name, chosen in (("all.png", (0, 1000)), ("zoomed.png", limits)):
+        figure = spiked()
+        figure.axes[0].set_xlim(chosen)
+        figure.savefig(tmp_path / name, bbox_inches="tight")
+        widths.append(matplotlib.image.imread(tmp_path / name).shape[1] / figure.dpi)
+    assert widths[0] == pytest.approx(widths[1], abs=0.1) and widths[0] <= SIZE_IN[0] + 0.25
+
+
+def test_a_line_that_is_hidden_or_removed_has_no_mark():
+    figure = spiked()
+    (line,) = figure.axes[0].get_lines()
+    assert len(drawn_marks(figure)) == 2
+    line.set_visible(False)
+    assert not drawn_marks(figure)
+    line.set_visible(True)
+    line.remove()
+    assert not drawn_marks(figure)

@@ -11,7 +11,9 @@ from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -27,6 +29,7 @@ FILE_STYLE: Any = {"svg.hashsalt": "airtouch", "pdf.fonttype": 42}
 
 OUTSIDE = 3  #: zorder of the marks of what is outside a pane, above that of lines, 2
 MARK = "outside"  #: gid of these marks
+LEAST_OUTSIDE = 1e-9  #: of a pane's size: what lies less far outside is on its edge, but for rounding
 TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
 
 
@@ -110,25 +113,42 @@ def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e
         low, high = np.min(ends), np.max(ends)
         pad = margin * max(high - low, least)
         ax.set_ylim(low - pad, high + pad)
-        _mark_outside(ax)
-        ax.callbacks.connect("ylim_changed", _mark_outside)
+        ax.add_artist(OutsideMarks())
 
 
-def _mark_outside(ax: Axes) -> None:
-    """Mark each stretch of a line outside the pane by a triangle at the pane's edge, where it is farthest out.
+class OutsideMarks(Artist):
+    """The marks of where the lines of a pane leave it, found anew whenever the pane is drawn.
 
-    The marks of earlier limits are removed.
+    So they fit whatever lines and limits the pane has by then. They take no room in a layout.
     """
-    for mark in [line for line in ax.get_lines() if line.get_gid() == MARK]:
-        mark.remove()
-    bottom, top = ax.get_ylim()
-    for line in [line for line in ax.get_lines() if line.get_transform() == ax.transData]:
-        x, y = np.asarray(line.get_xydata()).T
-        height = (y - bottom) / (top - bottom)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.set(zorder=OUTSIDE, in_layout=False, clip_on=False)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw them."""
+        if self.get_visible() and isinstance(self.axes, Axes):
+            for mark in marks_outside(self.axes):
+                mark.set_figure(self.axes.figure)
+                mark.draw(renderer)
+
+
+def marks_outside(ax: Axes) -> list[Line2D]:
+    """Triangles at a pane's edges, for each stretch of a line above or below the pane one where it is farthest out.
+
+    Of a line, only what lies between the limits in x counts.
+    """
+    marks = []
+    for line in ax.get_lines():
+        if not line.get_visible() or line.get_transform() != ax.transData:
+            continue
+        x, height = (ax.transScale + ax.transLimits).transform(line.get_xydata()).T  # 0 to 1 within the pane
+        within = (x > -LEAST_OUTSIDE) & (x < 1.0 + LEAST_OUTSIDE)
         for edge, marker, beyond in ((1.0, "^", height - 1.0), (0.0, "v", -height)):
-            bounds = np.flatnonzero(np.diff(beyond > 0.0, prepend=False, append=False))
+            bounds = np.flatnonzero(np.diff(within & (beyond > LEAST_OUTSIDE), prepend=False, append=False))
             farthest = [a + int(np.argmax(beyond[a:b])) for a, b in bounds.reshape(-1, 2)]
-            if farthest:  # not by `plot`, which asks for new limits
-                ax.add_line(Line2D(x[farthest], np.full(len(farthest), edge), linestyle="", marker=marker, gid=MARK,
-                                   transform=ax.get_xaxis_transform(), color=line.get_color(), ms=4, mew=0,
-                                   clip_on=False, zorder=OUTSIDE))
+            if farthest:
+                marks.append(Line2D(x[farthest], np.full(len(farthest), edge), linestyle="", marker=marker, gid=MARK,
+                                    transform=ax.transAxes, color=line.get_color(), ms=4, mew=0))
+    return marks
