@@ -157,6 +157,36 @@ def test_ticks_that_a_user_sets_have_true_labels():
     assert labels == [["3", "30"], ["10⁻³", "2·10⁻³", "5.5·10⁻³", "2·10⁻²"]]
 
 
+@pytest.mark.parametrize(("limits", "expected"), [
+    ((1e-3, 1e-1), [1e-3, 1e-2, 1e-1]), ((1e-1, 1e-3), [1e-3, 1e-2, 1e-1]), ((1.5e-3, 6e-3), [2e-3, 5e-3]),
+    ((1e-2, 9e-2), [1e-2, 2e-2, 5e-2]), ((1e-3, 1e5), [1e-3, 1e0, 1e3]),
+    ((1.1e-3, 9e-2), [2e-3, 1e-2, 5e-2]), ((2.1e-3, 4.1e-3), [3e-3, 4e-3])])
+def test_an_axis_of_power_has_labels_within_the_limits_that_a_user_sets(limits, expected):
+    power = np.geomspace(1e-8, 1e3, 51)
+    (ax,) = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)]).axes
+    ax.set_ylim(limits)
+    assert shown_ticks(ax.yaxis, limits) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("limits", "expected"), [
+    ((2.0, 20.0), [2.0, 5.0, 10.0, 20.0]), ((11.0, 19.0), [12.0, 14.0, 16.0, 18.0]), ((0.1, 0.3), [0.1, 0.2])])
+def test_a_frequency_axis_has_labels_within_the_limits_that_a_user_sets(limits, expected):
+    """Of all panes, which share it."""
+    power = np.geomspace(1e-8, 1e3, 51)
+    axes = gap_figures.spectra(FREQUENCY_HZ, [Spectrum("force_x", "m/s^2", power, None, power)] * 2).axes
+    axes[0].set_xlim(limits)
+    for ax in axes:
+        assert shown_ticks(ax.xaxis, limits) == pytest.approx(expected)
+
+
+def shown_ticks(axis, limits):
+    """Places of the ticks of an axis between its limits, those with labels."""
+    axis.figure.draw_without_rendering()
+    low, high = sorted(limits)
+    return [tick.get_loc() for tick in axis.get_major_ticks()
+            if tick.label1.get_text() and 0.999 * low <= tick.get_loc() <= 1.001 * high]
+
+
 def test_a_spectrum_without_a_floor_has_no_line_for_it_and_the_legend_names_that_of_the_others():
     power = np.full(51, 4.0)
     shown = [Spectrum("command_yaw", "N", power, None, None), Spectrum("force_x", "m/s^2", power, None, power / 4.0)]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import FuncFormatter, Locator, MaxNLocator, NullFormatter, StrMethodFormatter
 
 from airtouch.gap.answer.curves import MeanSpectra, Signal, Spectrum
 from airtouch.gap.signals.channels import CHANNEL_WORDS
@@ -28,6 +28,8 @@ SIGNAL_LIMITS = {"margin": 0.2, "least": 1e-6}  #: arguments of `style.limit` fo
 LEAST_POWER = 1e-12  #: least power that is drawn, in a channel's unit squared/Hz, as 0 has no place on a log axis
 MOST_LABELS = 4  #: labels of an axis of power; chosen, as many as fit a pane
 WIDTH_IN = 4.4  #: inch, width of a plot; chosen, readable on a phone
+POWERS = 10.0 ** np.arange(-40, 41)  #: that have a label on an axis of power
+ROUNDING = 1e-9  #: relative, of a limit that a tick is at
 #: of a plot with a legend above each pane, and of one with titles and one legend above all
 LEGENDS, TITLES = Room(left_in=1.0, below_in=0.5, above_in=0.35), Room(0.75, 0.5, 0.3, top_in=0.25)
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -122,10 +124,33 @@ def _legend(figure: Figure, axes: np.ndarray) -> None:
     figure.legend(handles, labels, loc="upper center", ncols=len(labels))
 
 
+class LogTicks(Locator):
+    """Ticks of a log axis: of some values those in view, at most some number of them, and others where there are not
+    two: 1, 2 and 5 times powers of ten, or, without two of these, evenly spaced ones.
+    """
+
+    def __init__(self, values: Sequence[float] | np.ndarray, most: int) -> None:
+        self.values, self.most = np.asarray(values, float), most
+
+    def __call__(self) -> Sequence[float]:
+        """The ticks of the axis as it is."""
+        return [] if self.axis is None else self.tick_values(*self.axis.get_view_interval())
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """The ticks between two limits."""
+        low, high = sorted((vmin, vmax))
+        for values in (self.values, np.outer(POWERS, (1.0, 2.0, 5.0)).ravel()):
+            inside = values[(values >= low * (1.0 - ROUNDING)) & (values <= high * (1.0 + ROUNDING))]
+            if len(inside) > 1:
+                return list(inside[::-(-len(inside) // self.most)])
+        return MaxNLocator(self.most, steps=[1, 2, 5, 10]).tick_values(low, high)
+
+
 def _frequency_axis(axes: np.ndarray, ticks: Sequence[float]) -> None:
     """Set plain ticks, Hz, on the frequency axis that the panes share."""
     for ax in axes:
-        ax.set_xticks(ticks)
+        ax.set_xticks(ticks)  # widens the axis to hold them
+        ax.xaxis.set_major_locator(LogTicks(ticks, len(ticks)))
         ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         ax.xaxis.set_minor_formatter(NullFormatter())
         _power_axis(ax)
@@ -142,8 +167,7 @@ def _power_axis(ax: Axes) -> None:
         else:
             last, high = last + 1, last + 1.0
     ax.set_ylim(10.0 ** low, 10.0 ** high)
-    step = -(-(last - first + 1) // MOST_LABELS)
-    ax.set_yticks(10.0 ** np.arange(first, last + 1, step))
+    ax.yaxis.set_major_locator(LogTicks(POWERS, MOST_LABELS))
     ax.yaxis.set_major_formatter(FuncFormatter(power_of_ten))
     ax.yaxis.set_minor_formatter(NullFormatter())
 
