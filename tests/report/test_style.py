@@ -63,14 +63,20 @@ def test_a_figure_that_is_saved_by_its_user_looks_as_in_the_page(room):
     assert len(ticks[0]) > 8 and ticks[0] == ticks[1]
 
 
-@pytest.mark.parametrize(("name", "first"), [("a.svg", b"<?xml"), ("a.PDF", b"%PDF-"), ("a.png", b"\x89PNG"),
-                                             ("a.plot", b"\x89PNG"), ("a", b"\x89PNG")])
+@pytest.mark.parametrize(("name", "first"), [("a.svg", b"<?xml"), ("a.PDF", b"%PDF-"), ("a.png", b"\x89PNG")])
 def test_the_ending_of_a_file_is_its_format(name, first, tmp_path):
     style.write_image(drawn(), tmp_path / name)
     assert (tmp_path / name).read_bytes().startswith(first)
     with pytest.raises(AirTouchError, match="--force"):
         style.write_image(drawn(), tmp_path / name)
     style.write_image(drawn(), tmp_path / name, force=True)
+
+
+@pytest.mark.parametrize("name", ["a.eps", "a.jpg", "a", "png"])
+def test_a_file_of_another_ending_is_refused(name, tmp_path):
+    with pytest.raises(AirTouchError, match=r"\.png, \.svg or \.pdf"):
+        style.write_image(drawn(), tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 def test_panes_of_a_fixed_layout_leave_the_room_that_was_asked_for():

@@ -17,6 +17,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from airtouch.errors import AirTouchError
 from airtouch.logs.files import write_bytes
 
 GREEN, BLUE, RED, GREY = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
@@ -92,12 +93,19 @@ def image(figure: Figure, form: str = "png") -> bytes:
 
 
 def write_image(figure: Figure, path: Path, force: bool = False) -> None:
-    """Write the figure as SVG, PDF or PNG, by the ending of the name; as PNG for any other ending.
+    """Write the figure as PNG, SVG or PDF, by the ending of the name.
 
-    Raises AirTouchError as `logs.files.write_bytes`.
+    Raises AirTouchError as `format_of`, and as `logs.files.write_bytes`.
     """
+    write_bytes(image(figure, format_of(path)), path, force)
+
+
+def format_of(path: Path) -> str:
+    """The one of FORMATS that the ending of a file's name says; raises AirTouchError for another ending."""
     ending = path.suffix.lower().removeprefix(".")
-    write_bytes(image(figure, ending if ending in FORMATS else "png"), path, force)
+    if ending not in FORMATS:
+        raise AirTouchError(f"{path}: a plot is written as .png, .svg or .pdf; give a name with one of these endings")
+    return ending
 
 
 def limit(ax: Axes, *values: np.ndarray, margin: float = 0.15, least: float = 1e-9) -> None:

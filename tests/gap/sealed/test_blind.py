@@ -249,6 +249,16 @@ def test_command_writes_figures(blind_check, tmp_path):
     assert "false alarms" in result.output
 
 
+@pytest.mark.parametrize("name", ["score.eps", "score.jpg", "score"])
+def test_a_plot_of_an_unknown_format_is_refused_before_the_work(name, blind_check, tmp_path):
+    answers = tmp_path / "answers.json"
+    answers.write_text("no answers, which nobody reads")
+    refused = CliRunner().invoke(command, ["blind", "score", str(blind_check[0]), str(answers), "--plot",
+                                           str(tmp_path / name)]).exception
+    assert isinstance(refused, AirTouchError) and ".png, .svg or .pdf" in str(refused)
+    assert list(tmp_path.iterdir()) == [answers]
+
+
 def test_a_score_without_a_plot_needs_no_matplotlib(blind_check, monkeypatch):
     folder = blind_check[0]
     monkeypatch.setitem(sys.modules, "matplotlib", None)

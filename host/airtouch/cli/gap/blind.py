@@ -62,6 +62,9 @@ def blind_score(folder: Path, answers: Path, key: Path | None, json_path: Path |
 
     if plot:
         need("plots", "--plot")
+        from airtouch.report.style import format_of
+
+        format_of(plot)  # refuses another before the work
     check_all_free((json_path, plot), force)
     _print_score(sealed.score(folder, answers, key), json_path, plot, force)
 
