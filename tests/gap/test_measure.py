@@ -66,6 +66,22 @@ def test_spectra_show_the_floor_of_the_baseline(sweeps):
     assert np.median(force.floor[high]) == pytest.approx(1.0 / 50.0, rel=0.3)
 
 
+def test_of_many_flights_the_curves_are_of_those_with_the_phase_of_the_answer(sweeps):
+    """Of 43 flights the last three alone go beyond hover, and there the gap is."""
+    real = [pushed(log, 3.0, "over platform") for log in sweeps]
+    before = [FlightLog({name: real[0][name][:450] for name in real[0].columns}, {"source": f"short {i}"})
+              for i in range(40)]
+    gap = measure(real, VEHICLE, calibrated=False)
+    phase = KINDS.index(gap.headline.phase)
+    assert phase not in ready(before[0], VEHICLE).phase
+    read = []
+    curves = curves_of_measurement(gap, (read.append(i) or log for i, log in enumerate(before + real)), VEHICLE)
+    assert phase in curves.signal.phase and len(read) == 43
+    read.clear()
+    curves_of_measurement(gap, (read.append(i) or log for i, log in enumerate(real * 16)), VEHICLE)
+    assert len(read) == 40
+
+
 def test_error_without_a_flight_is_that_of_the_flight_not_of_the_baseline(sweeps):
     bad, bad_nominal = (FlightLog({"t_s": sweeps[0]["t_s"][:20]}, {"source": name}) for name in ("real", "nominal"))
     with pytest.raises(AirTouchError, match="real") as error:

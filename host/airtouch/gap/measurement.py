@@ -1,9 +1,8 @@
 """Where: the gap of recorded flights to the simulator, before anything is blamed for it."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from airtouch.gap.where.command_power import MeanSpectra, SummedPower, command_p
 from airtouch.gap.where.gap_map import GapMap, Part, assemble, part_of
 from airtouch.gap.where.rotor_speeds import RotorSpeed, rotor_speeds, speeds_over_flights
 from airtouch.logs.flight_log import GYRO, FlightLog
+from airtouch.logs.segments import KINDS
 from airtouch.vehicle import Vehicle, name_in, other_baseline
 
 
@@ -194,11 +194,24 @@ def measured_flight(studies: Sequence[Study], log: FlightLog, uses_gyro: bool = 
 
 
 def curves_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], vehicle: Vehicle) -> Curves:
-    """The curves of a measurement, of its first flights."""
-    first = (log if measurement.uses_gyro else without_gyro(log) for log in islice(logs, MOST_FLIGHTS))
-    flights = with_gyro_if_any(list(ready_flights(first, vehicle, [])), []) if measurement.where else []
+    """The curves of a measurement, of MOST_FLIGHTS flights: first those that have the phase of the headline's cell."""
+    if not measurement.where:
+        return Curves(commands=measurement.spectra)
+    usable = ready_flights((log if measurement.uses_gyro else without_gyro(log) for log in logs), vehicle, [])
+    flights = with_gyro_if_any(_first_with(KINDS.index(measurement.where[0].phase), usable), [])
     if not flights:
         return Curves(commands=measurement.spectra)
     curves = curves_of(measurement.study or declared_study(vehicle, ()), flights, measurement.nominal, [],
                        measurement.where, measurement.map.cells)
     return replace(curves, commands=measurement.spectra)
+
+
+def _first_with(phase: int, flights: Iterator[Flight]) -> list[Flight]:
+    """The first MOST_FLIGHTS flights with a phase, filled up by the first without; reads no more than it needs."""
+    having: list[Flight] = []
+    others: list[Flight] = []
+    while len(having) < MOST_FLIGHTS and (flight := next(flights, None)) is not None:
+        some = having if phase in flight.phase else others
+        if len(some) < MOST_FLIGHTS:
+            some.append(flight)
+    return (having + others)[:MOST_FLIGHTS]
