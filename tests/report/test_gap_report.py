@@ -105,7 +105,8 @@ def test_captions_say_what_before_and_after_are_where_there_is_an_after(pushed_f
         gap_report.write_diagnosis(tmp_path / "gap.html", replace(result, curves=curves), command="x", force=True)
         text, _ = checked(tmp_path / "gap.html")
         assert text.count("without and with the named effects in the model") == times
-        assert "Mean over the flights (40 of them if there are more)." in text
+        assert "if there are more than 40, over 40 of them, first those that have the phase of the answer's" in text
+        assert ("first those in which a named passing effect acts" in text) is (curves.spectra[0].after is not None)
 
 
 def test_a_floor_of_the_spectra_is_explained_where_one_is_drawn(pushed_flights, tmp_path):

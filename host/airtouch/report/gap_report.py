@@ -188,10 +188,12 @@ def _plots(curves: Curves | None) -> list[Plot]:
         plots.append(Plot("signal", f"{gap_tables.capital(CHANNEL_WORDS[signal.channel])}, {low:g}-{high:g} Hz",
                           " ".join(caption), partial(gap_figures.signals, signal)))
     if curves.spectra:
-        text = f"Mean over the flights ({MOST_FLIGHTS} of them if there are more). "
+        has_after = any(spectrum.after is not None for spectrum in curves.spectra)
+        text = (f"Mean over the flights (if there are more than {MOST_FLIGHTS}, over {MOST_FLIGHTS} of them, first "
+                "those that have the phase of the answer's cell"
+                + (", of these first those in which a named passing effect acts). " if has_after else "). "))
         text += f"{curves.remark} " if curves.remark else ""
-        if any(spectrum.after is not None for spectrum in curves.spectra):
-            text += f"{BEFORE_AFTER} "
+        text += f"{BEFORE_AFTER} " if has_after else ""
         if any(spectrum.floor is not None for spectrum in curves.spectra):
             text += "Floor: the same of the baseline flights; with few or none, the noise of the sensors. "
         text += "The lowest frequency holds a part of a constant gap."
