@@ -122,6 +122,22 @@ def test_the_phase_of_the_answers_cell_has_a_bar_in_every_pane():
     assert not ax.patches
 
 
+def test_no_name_of_a_phase_stands_beside_a_pane_with_other_limits():
+    """Nor takes it part in the layout."""
+    phase = np.repeat([KINDS.index(k) for k in ("take-off", "over platform", "landing")], [30, 40, 30])
+    figure = gap_figures.signals(signal(measured=False, phase=phase))
+    (ax,) = figure.axes
+    names = {}
+    for limits in ((0.0, 9.9), (4.0, 6.0), (4.0, 4.5)):
+        ax.set_xlim(limits)
+        figure.draw_without_rendering()
+        inside = ax.get_window_extent().padded(1.0)
+        boxes = {text.get_text(): text.get_tightbbox() for text in ax.texts}
+        names[limits] = {name for name, box in boxes.items() if box.width > 0.0}
+        assert all(inside.overlaps(boxes[name]) for name in names[limits])
+    assert list(names.values()) == [{"take-off", "over platform", "landing"}, {"over platform"}, set()]
+
+
 @pytest.mark.parametrize("after", [True, False])
 def test_spectra_have_a_pane_for_each_channel(after):
     power = np.full(51, 4.0)

@@ -27,7 +27,7 @@ def _draw_confusion(axes: Axes, table: Mapping[str, Mapping[str, int]]) -> None:
     shown = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1.0)
     axes.imshow(shown, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
     for i, j in zip(*np.nonzero(counts), strict=True):
-        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7,
+        axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7, clip_on=True,
                   color="white" if shown[i, j] > 0.6 else "black")
     axes.set_xticks(range(len(answers)), answers, rotation=90)
     axes.set_yticks(range(len(true)), true)

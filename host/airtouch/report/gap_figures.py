@@ -193,7 +193,7 @@ def _phases(ax: Axes, signal: Signal) -> None:
         if kind in PHASE_COLOURS:
             ax.axvspan(time_s[a], time_s[b], color=PHASE_COLOURS[kind], lw=0, zorder=0)
             if b - a > 0.15 * len(phase):
-                ax.text((time_s[a] + time_s[b]) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center",
-                        va="top", fontsize=8, color=GREY)
+                ax.annotate(kind, ((time_s[a] + time_s[b]) / 2, 0.98), xycoords=ax.get_xaxis_transform(), ha="center",
+                            va="top", fontsize=8, color=GREY, annotation_clip=True)  # clip: with its place in view
         if signal.cell is not None and kind == signal.cell.phase:
             ax.axvspan(time_s[a], time_s[b], **ANSWER)

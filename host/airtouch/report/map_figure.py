@@ -105,7 +105,7 @@ def _scale_bar(ax: Axes) -> None:
     length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
     x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
     ax.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt", scalex=False, scaley=False)
-    ax.text(x + length / 2, y, f"{length:g} m", ha="center", va="bottom", fontsize=8)
+    ax.text(x + length / 2, y, f"{length:g} m", ha="center", va="bottom", fontsize=8, clip_on=True)
 
 
 def _direction(xy: np.ndarray, sample: int) -> np.ndarray:
