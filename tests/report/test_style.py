@@ -89,6 +89,20 @@ def test_panes_of_a_fixed_layout_leave_the_room_that_was_asked_for():
     assert between == pytest.approx(0.25) and upper.get_shared_x_axes().joined(upper, lower)
 
 
+def test_a_figure_of_another_size_leaves_its_labels_the_same_room():
+    """In inches; at a size without place for a pane nothing fails."""
+    figure, axes = style.panes(SIZE_IN, 2, 1, style.Room(left_in=1.0, below_in=0.5, above_in=0.25, right_in=0.5))
+    for size in ((8.0, 6.0), (2.0, 1.5)):
+        figure.set_size_inches(*size)
+        (upper,), (lower,) = axes
+        assert np.multiply(lower.get_position().min, size) == pytest.approx((1.0, 0.5))
+        assert np.multiply(upper.get_position().max, size) == pytest.approx((size[0] - 0.5, size[1] - 0.25))
+        assert (upper.get_position().y0 - lower.get_position().y1) * size[1] == pytest.approx(0.25)
+    for size in ((1.4, 1.5), (2.0, 0.9), (0.1, 0.1)):
+        figure.set_size_inches(size)
+        assert style.image(figure)
+
+
 def marks(ax, marker):
     """Places in x of the marks at an edge of the pane, rounded to samples."""
     return [round(ax.transData.inverted().transform(point)[0])

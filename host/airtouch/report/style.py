@@ -34,15 +34,6 @@ LEAST_OUTSIDE = 1e-9  #: of a pane's size: what lies less far outside is on its 
 TITLE_AT = 1.0  #: height of a title over the pane's: where it is not given, matplotlib lays the axes out twice
 
 
-class PlotFigure(Figure):
-    """A figure whose files have FILE_STYLE, whoever saves them."""
-
-    def savefig(self, *args: Any, **settings: Any) -> None:
-        """Save it as `Figure.savefig` does."""
-        with matplotlib.rc_context(FILE_STYLE):
-            super().savefig(*args, **settings)
-
-
 class Room(NamedTuple):
     """Room for labels and titles, inch: left of, below and above a pane, right of all, and at the top of all."""
 
@@ -53,6 +44,38 @@ class Room(NamedTuple):
     top_in: float = 0.0
 
 
+class PlotFigure(Figure):
+    """A figure whose files have FILE_STYLE, whoever saves them, and whose panes leave their room at any size."""
+
+    room: Room | None = None  #: of its panes, where their layout is fixed
+    grid = (1, 1)  #: rows and columns of these panes
+
+    def savefig(self, *args: Any, **settings: Any) -> None:
+        """Save it as `Figure.savefig` does."""
+        with matplotlib.rc_context(FILE_STYLE):
+            super().savefig(*args, **settings)
+
+    def set_size_inches(self, *args: Any, **settings: Any) -> None:
+        """Set the size as `Figure.set_size_inches` does."""
+        super().set_size_inches(*args, **settings)
+        self.leave_room()
+
+    def leave_room(self) -> None:
+        """Lay the panes out in the room that is left, if their layout is fixed and there is any."""
+        if self.room is None:
+            return
+        width_in, height_in = self.get_size_inches()
+        rows, columns = self.grid
+        pane_width_in = (width_in - self.room.right_in) / columns - self.room.left_in
+        pane_height_in = (height_in - self.room.below_in - self.room.top_in) / rows - self.room.above_in
+        if pane_width_in > 0.0 and pane_height_in > 0.0:
+            self.subplots_adjust(
+                left=self.room.left_in / width_in, right=1.0 - self.room.right_in / width_in,
+                bottom=self.room.below_in / height_in,
+                top=1.0 - (self.room.above_in + self.room.top_in) / height_in,
+                wspace=self.room.left_in / pane_width_in, hspace=self.room.above_in / pane_height_in)
+
+
 def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: Room | None = None,
           **subplots: Any) -> tuple[Figure, np.ndarray]:
     """A figure, and its panes (rows, columns).
@@ -61,22 +84,14 @@ def panes(size_in: tuple[float, float], rows: int = 1, columns: int = 1, room: R
     the lowest alone; without, matplotlib finds the layout, for which it draws twice. subplots: as in `Figure.subplots`.
     """
     figure = PlotFigure(figsize=size_in, layout=None if room else "constrained")
+    figure.room, figure.grid = room, (rows, columns)
+    figure.leave_room()
     if room:
-        subplots = {"sharex": True, "gridspec_kw": _grid(size_in, rows, columns, room), **subplots}
+        subplots = {"sharex": True, **subplots}
     axes = figure.subplots(rows, columns, squeeze=False, **subplots)
     for ax in axes.flat:  # as many ticks as fit are made when the figure is saved, by then without the style
         ax.tick_params(which="both", labelsize=matplotlib.rcParams["font.size"])
     return figure, axes
-
-
-def _grid(size_in: tuple[float, float], rows: int, columns: int, room: Room) -> dict[str, float]:
-    """Ends of the panes, fractions of the figure, and spaces between them, fractions of a pane: `gridspec_kw`."""
-    width_in, height_in = size_in
-    pane_width_in = (width_in - room.right_in) / columns - room.left_in
-    pane_height_in = (height_in - room.below_in - room.top_in) / rows - room.above_in
-    return {"left": room.left_in / width_in, "right": 1.0 - room.right_in / width_in,
-            "bottom": room.below_in / height_in, "top": 1.0 - (room.above_in + room.top_in) / height_in,
-            "wspace": room.left_in / pane_width_in, "hspace": room.above_in / pane_height_in}
 
 
 def style(changes: Mapping[str, Any] | None = None) -> AbstractContextManager[None]:
