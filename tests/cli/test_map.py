@@ -157,6 +157,24 @@ def test_the_scale_bar_covers_nothing_of_a_flight_that_begins_at_the_lower_left(
         assert max(top, ax.lines[-1].get_ydata().max()) < xy[:, 1].min()
 
 
+@pytest.mark.parametrize("limits", [(1.0, 1.6), (1.6, 1.0), (-5.0, 30.0), (0.0, 0.4)])
+def test_the_scale_bar_stays_in_a_map_with_other_limits_and_is_as_long_as_it_says(limits):
+    from airtouch.detector.evaluation.edge_map import EdgeMap
+    from airtouch.report import map_figure
+
+    xy = np.column_stack([np.linspace(0.0, 3.0, 500), np.zeros(500)])
+    figure = map_figure.edge_map(EdgeMap(xy, [], [], "logged", 0.0, 0.1), "a flight")
+    (ax,) = figure.axes
+    ax.set(xlim=limits, ylim=np.subtract(limits, 1.0))
+    figure.set_size_inches(3.3, 2.5)
+    figure.draw_without_rendering()
+    (text,) = [t for t in ax.texts if t.get_text()]
+    ends = ax.lines[-1].get_xydata()
+    assert abs(ends[1, 0] - ends[0, 0]) == pytest.approx(float(text.get_text().removesuffix(" m")))
+    places = ax.transAxes.inverted().transform(ax.transData.transform([*ends, text.get_position()]))
+    assert (places >= 0.0).all() and (places <= 0.6).all() and places[1, 0] > places[0, 0]
+
+
 def test_the_band_of_an_outline_is_named_in_the_legend_and_reaches_two_sigma_beyond_it():
     """A platform of 1 by 1 m, known to 0.05 m."""
     from shapely.geometry import LineString, box

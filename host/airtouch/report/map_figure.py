@@ -100,12 +100,21 @@ def _room_below(ax: Axes, xy: np.ndarray) -> None:
 
 
 def _scale_bar(ax: Axes) -> None:
-    """Draw a scale bar of a round length at the lower left."""
-    (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
-    length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * (x1 - x0)), 0.05)
-    x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
-    ax.plot([x, x + length], [y, y], color="black", lw=3, solid_capstyle="butt", scalex=False, scaley=False)
-    ax.text(x + length / 2, y, f"{length:g} m", ha="center", va="bottom", fontsize=8, clip_on=True)
+    """Draw a scale bar of a round length at the lower left, and keep it there when the limits change."""
+    (bar,) = ax.plot([], [], color="black", lw=3, solid_capstyle="butt", scalex=False, scaley=False)
+    text = ax.text(0.0, 0.0, "", ha="center", va="bottom", fontsize=8)
+
+    def place(ax: Axes) -> None:
+        (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
+        length = next((s for s in (5.0, 2.0, 1.0, 0.5, 0.2, 0.1) if s < 0.3 * abs(x1 - x0)), 0.05)
+        x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
+        end = x + np.copysign(length, x1 - x0)
+        bar.set_data(np.array([x, end]), np.array([y, y]))
+        text.set(position=((x + end) / 2, y), text=f"{length:g} m")
+
+    place(ax)
+    for change in ("xlim_changed", "ylim_changed"):
+        ax.callbacks.connect(change, place)
 
 
 def _direction(xy: np.ndarray, sample: int) -> np.ndarray:
