@@ -171,8 +171,11 @@ def test_the_scale_bar_stays_in_a_map_with_other_limits_and_is_as_long_as_it_say
     (text,) = [t for t in ax.texts if t.get_text()]
     ends = ax.lines[-1].get_xydata()
     assert abs(ends[1, 0] - ends[0, 0]) == pytest.approx(float(text.get_text().removesuffix(" m")))
-    places = ax.transAxes.inverted().transform(ax.transData.transform([*ends, text.get_position()]))
+    places = ax.transAxes.inverted().transform(ax.transData.transform([*ends, text.xy]))
     assert (places >= 0.0).all() and (places <= 0.6).all() and places[1, 0] > places[0, 0]
+    assert ax.get_xlim() == pytest.approx(limits) and ax.get_ylim() == pytest.approx(np.subtract(limits, 1.0))
+    width_px = 3.0 * figure.dpi / 72.0  # of the bar
+    assert text.get_window_extent().y0 > ax.transData.transform(ends)[0, 1] + 0.5 * width_px
 
 
 def test_the_band_of_an_outline_is_named_in_the_legend_and_reaches_two_sigma_beyond_it():

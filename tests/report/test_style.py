@@ -6,6 +6,7 @@ import matplotlib
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.backends.backend_pdf import PdfPages
 
 from airtouch.errors import AirTouchError
 from airtouch.report import style
@@ -47,6 +48,15 @@ def test_a_pdf_that_its_user_saves_has_no_font_of_type_3(tmp_path):
     with matplotlib.rc_context({"svg.fonttype": "none"}):
         figure.savefig(tmp_path / "a.svg")
     assert "other</text>" in (tmp_path / "a.svg").read_text()
+
+
+@pytest.mark.parametrize(("kind", "two_bytes"), [(3, False), (42, True)])
+def test_pages_of_a_pdf_are_written_in_the_fonts_that_are_set_there(kind, two_bytes, tmp_path):
+    """Fonts are stored when the file is closed. Text of TrueType has two bytes a letter, which is wrong in another."""
+    with matplotlib.rc_context({"pdf.fonttype": kind, "pdf.compression": 0}), PdfPages(tmp_path / "a.pdf") as pages:
+        pages.savefig(drawn())
+    lines = [x for x in (tmp_path / "a.pdf").read_bytes().splitlines() if x.endswith((b"Tj", b"TJ"))]
+    assert lines and any(b"(\0" in x for x in lines) == two_bytes
 
 
 @pytest.mark.parametrize("room", [None, style.Room(0.5, 0.5, 0.3)])

@@ -30,8 +30,9 @@ def edge_map(edges: EdgeMap, title: str) -> Figure:
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=5, frameon=False)
-        figure.draw_without_rendering()  # equal axes change the limits when they are drawn
         _scale_bar(ax)
+        figure.draw_without_rendering()  # the limits grow to fill the pane
+        ax.set_adjustable("box")  # those that are set later hold
     return figure
 
 
@@ -102,7 +103,7 @@ def _room_below(ax: Axes, xy: np.ndarray) -> None:
 def _scale_bar(ax: Axes) -> None:
     """Draw a scale bar of a round length at the lower left, and keep it there when the limits change."""
     (bar,) = ax.plot([], [], color="black", lw=3, solid_capstyle="butt", scalex=False, scaley=False)
-    text = ax.text(0.0, 0.0, "", ha="center", va="bottom", fontsize=8)
+    text = ax.annotate("", (0.0, 0.0), (0.0, 3.0), textcoords="offset points", ha="center", va="bottom", fontsize=8)
 
     def place(ax: Axes) -> None:
         (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
@@ -110,7 +111,8 @@ def _scale_bar(ax: Axes) -> None:
         x, y = x0 + 0.04 * (x1 - x0), y0 + 0.05 * (y1 - y0)
         end = x + np.copysign(length, x1 - x0)
         bar.set_data(np.array([x, end]), np.array([y, y]))
-        text.set(position=((x + end) / 2, y), text=f"{length:g} m")
+        text.xy = ((x + end) / 2, y)
+        text.set_text(f"{length:g} m")
 
     place(ax)
     for change in ("xlim_changed", "ylim_changed"):

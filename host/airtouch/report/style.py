@@ -4,6 +4,7 @@ A plot is a function that returns a matplotlib `Figure`, drawn without pyplot: i
 """
 
 import io
+import os
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -50,13 +51,18 @@ class PlotFigure(Figure):
     room: Room | None = None  #: of its panes, where their layout is fixed
     grid = (1, 1)  #: rows and columns of these panes
 
-    def savefig(self, *args: Any, **settings: Any) -> None:
-        """Save it as `Figure.savefig` does."""
-        with matplotlib.rc_context(FILE_STYLE):
-            super().savefig(*args, **settings)
+    def savefig(self, fname: Any, **settings: Any) -> None:
+        """Save it as `Figure.savefig` does.
+
+        A page of matplotlib's `PdfPages` has the fonts that are set where these are closed: there FILE_STYLE would mix
+        two kinds, and is left out.
+        """
+        a_file = isinstance(fname, (str, os.PathLike, io.IOBase))
+        with matplotlib.rc_context(FILE_STYLE if a_file else {}):
+            super().savefig(fname, **settings)
 
     def set_size_inches(self, *args: Any, **settings: Any) -> None:
-        """Set the size as `Figure.set_size_inches` does."""
+        """Set the size as `Figure.set_size_inches` does; panes with fixed room are laid out anew."""
         super().set_size_inches(*args, **settings)
         self.leave_room()
 
