@@ -40,7 +40,7 @@ def _draw_reliability(axes: Axes, points: Sequence[Mapping[str, float]]) -> None
     p, share = (np.array([b[k] for b in points], float) for k in ("probability", "value"))
     bars = np.maximum([share - [b["low"] for b in points], [b["high"] for b in points] - share], 0.0)
     axes.plot([0, 1], [0, 1], color=GREY, lw=0.8)
-    axes.errorbar(p, share, bars, fmt="o", color=BLUE, ms=4, lw=1)
+    axes.errorbar(p, share, bars, fmt="o", color=BLUE, ms=4, lw=1, clip_on=False)
     for b in points:
         axes.annotate(f"{b['n']}", (b["probability"], b["value"]), xytext=(5, -9), textcoords="offset points",
                       fontsize=7, color=GREY)

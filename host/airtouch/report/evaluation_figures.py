@@ -49,8 +49,9 @@ def flight(
     """One flight, from signals to edges, in panes over the same time axis.
 
     The panes: signals, band power, probability, detected edges, disturbance force with its FR-CFAR threshold, down
-    range. Panes without a signal in the trace are left out. edges: true ones, marked in every pane. others: traces of
-    other detectors, whose edges are shown below those of `trace`. name: label of `trace`.
+    range. Panes without a signal in the trace are left out. A detected edge stands where it was reported, later by the
+    detector's lag. edges: true ones, marked in every pane. others: traces of other detectors, whose edges are shown
+    below those of `trace`. name: label of `trace`.
     """
     drawn: list[Callable[[Axes, PlottedFlight], None]] = []
     drawn += [_accelerations, _rates, _motors] if "channels" in trace.signals else []
@@ -79,7 +80,7 @@ def reliability(curves: Mapping[str, Reliability]) -> Figure:
         for name, curve in curves.items():
             if len(curve.stated):
                 ax.plot(curve.stated, curve.truly, color=colour_of(name), lw=1, alpha=0.6)
-                ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name),
+                ax.scatter(curve.stated, curve.truly, s=8 + 250 * curve.samples, color=colour_of(name), clip_on=False,
                            label=f"{name}, ECE {curve.ece:.3f}")
         ax.set(xlim=(0, 1), ylim=(0, 1), xlabel="P(over a platform) as stated", ylabel="fraction truly over",
                title="Reliability; the larger a dot, the more samples")
