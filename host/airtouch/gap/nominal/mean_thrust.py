@@ -2,7 +2,7 @@
 
 Logged commands are aliased: the log has every fifth of them. What thrust does from moment to moment therefore makes the
 rotors too weak (regression dilution), and where nothing else shows the accelerometer's vertical bias, a false one makes
-up for that in the mean. neural-swarm's rotors came out 7 to 16 % too weak, with a bias of up to 1.4 m/s^2. The mean of
+up for that in the mean. neural-swarm's rotors came out 8 to 21 % too weak, with a bias of 0.6 to 1.4 m/s^2. The mean of
 the commands is not diluted. Take-off and landing are left out of it: there a lag shows that is fitted too long, for the
 same reason.
 """
