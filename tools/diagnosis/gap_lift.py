@@ -135,10 +135,11 @@ def _by_channel(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
 
 def _print_by_channel(folder: Path) -> None:
     """A row a flight and one of medians, a column a channel and band."""
-    names, found = zip(*_by_channel(folder), strict=True)
+    names, by_flight = zip(*_by_channel(folder), strict=True)
     print("| flight | " + " | ".join(f"{channel}, band {band}" for channel, band in PLACES) + " |")
     print("|---" * (len(PLACES) + 1) + "|")
-    for name, row in (*zip(names, found, strict=True), (f"median of {len(found)}", np.median(found, axis=0))):
+    median = (f"median of {len(by_flight)}", np.median(by_flight, axis=0))
+    for name, row in (*zip(names, by_flight, strict=True), median):
         print(f"| {name} | " + " | ".join(f"{x:.2f}" for x in row) + " |")
 
 

@@ -208,10 +208,10 @@ def curves_of_measurement(measurement: Measurement, logs: Iterable[FlightLog], v
 
 def _first_with(phase: int, flights: Iterator[Flight]) -> list[Flight]:
     """The first MOST_FLIGHTS flights with a phase, filled up by the first without; reads no more than it needs."""
-    having: list[Flight] = []
-    others: list[Flight] = []
-    while len(having) < MOST_FLIGHTS and (flight := next(flights, None)) is not None:
-        some = having if phase in flight.phase else others
-        if len(some) < MOST_FLIGHTS:
-            some.append(flight)
-    return (having + others)[:MOST_FLIGHTS]
+    with_phase: list[Flight] = []
+    without_phase: list[Flight] = []
+    while len(with_phase) < MOST_FLIGHTS and (flight := next(flights, None)) is not None:
+        group = with_phase if phase in flight.phase else without_phase
+        if len(group) < MOST_FLIGHTS:
+            group.append(flight)
+    return (with_phase + without_phase)[:MOST_FLIGHTS]

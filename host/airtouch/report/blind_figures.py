@@ -13,9 +13,9 @@ from airtouch.report.style import BLUE, GREY, panes, style
 def confusion_and_reliability(score: Mapping[str, Any]) -> Figure:
     """The confusion matrix beside the reliability diagram."""
     with style():
-        figure, ((left, right),) = panes((12.0, 7.6), columns=2, width_ratios=[1.7, 1.0])
-        _draw_confusion(left, score["confusion"])
-        _draw_reliability(right, score["reliability"])
+        figure, ((confusion, reliability),) = panes((12.0, 7.6), columns=2, width_ratios=[1.7, 1.0])
+        _draw_confusion(confusion, score["confusion"])
+        _draw_reliability(reliability, score["reliability"])
     return figure
 
 

@@ -24,7 +24,7 @@ from airtouch.logs.files import write_bytes
 GREEN, BLUE, RED, GREY = "#1a7f37", "#0b57d0", "#b3261e", "#8a8f98"
 STYLE: dict[str, Any] = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9,
                          "figure.dpi": 120}
-#: image formats, and what each stores of the time at which it was made: nothing, so that equal figures are equal files
+#: image formats, with the metadata of each: no date, so that equal figures are equal files
 FORMATS: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 #: of a file: names in an SVG that do not change, and fonts in a PDF that journals take (TrueType)
 FILE_STYLE: Any = {"svg.hashsalt": "airtouch", "pdf.fonttype": 42}

@@ -128,10 +128,10 @@ def test_at_rest_noise_of_the_imu_is_that_of_simulated_pairs():
 
 def test_noise_twice_as_loud_adds_three_times_the_power_of_the_declared_in_each_band():
     """In the air and at rest, where a bin of the spectra is wider than the lowest two bands."""
-    made = flight(20.0, resting_s=4.0)
+    hover = flight(20.0, resting_s=4.0)
     noise = with_values("imu_noise", factor=2.0)
-    sums = block_sums(made, np.zeros((len(made), 13)), VEHICLE)
-    power = random_power(study(), made, [noise]).mean
+    sums = block_sums(hover, np.zeros((len(hover), 13)), VEHICLE)
+    power = random_power(study(), hover, [noise]).mean
     for rows in (sums.phase == GROUND, sums.phase == HOVER):
         expected = 3.0 * sensor_rms(VEHICLE) ** 2
         np.testing.assert_allclose(per_sample(sums, power, rows)[:, FORCE], expected[:, FORCE], rtol=0.03)
@@ -139,10 +139,10 @@ def test_noise_twice_as_loud_adds_three_times_the_power_of_the_declared_in_each_
 
 
 def test_a_passing_effect_adds_its_power_in_its_seconds_alone():
-    made = flight(20.0, name="shaken")
+    hover = flight(20.0, name="shaken")
     noise = with_values("imu_noise", factor=2.0)
-    sums = block_sums(made, np.zeros((len(made), 13)), VEHICLE)
-    whole, part = (random_power(study(), made, [replace(noise, gate=g)]).mean[:, 0, 5, 0].sum()
+    sums = block_sums(hover, np.zeros((len(hover), 13)), VEHICLE)
+    whole, part = (random_power(study(), hover, [replace(noise, gate=g)]).mean[:, 0, 5, 0].sum()
                    for g in ((), (("shaken", 5.0, 9.0), ("another", 0.0, 20.0))))
     assert part == pytest.approx(0.2 * whole) and len(sums.phase) > 5
 
@@ -195,8 +195,8 @@ def test_of_a_wrong_power_the_map_has_the_difference_left(name, values, key, tim
     before, after = squares_of_map(fly(FLIGHTS, 7, [(name, flown)]), parts)
     of_calm, _ = squares_of_map(calm())
     moved = before > 1.5 ** 2 * of_calm
-    left = (after - of_calm)[moved] / (before - of_calm)[moved]
-    assert np.median(left) == pytest.approx(share, abs=LOOP_ERROR)
+    remaining_share = (after - of_calm)[moved] / (before - of_calm)[moved]
+    assert np.median(remaining_share) == pytest.approx(share, abs=LOOP_ERROR)
 
 
 @pytest.mark.parametrize("times", [2.0, 3.0])
@@ -214,19 +214,19 @@ def test_too_much_power_counts_as_gap_in_a_single_flight_s_short_phases(times):
 
 def test_the_variance_of_the_power_is_that_of_pieces_of_noise():
     """White noise in blocks of 2.56 s: the mean square of the power's relative deviations, over what is expected."""
-    made, noise = flight(240.0), with_values("imu_noise", factor=2.0)
-    drawn = np.random.default_rng(3).normal(0.0, 1.0, (len(made), 13))
-    mean, variance = (x[:, 0, 1:, 0] for x in random_power(study(), made, [noise]))
-    power = block_sums(made, drawn, VEHICLE).power[:, 0, 1:, 0]
+    hover, noise = flight(240.0), with_values("imu_noise", factor=2.0)
+    drawn = np.random.default_rng(3).normal(0.0, 1.0, (len(hover), 13))
+    mean, variance = (x[:, 0, 1:, 0] for x in random_power(study(), hover, [noise]))
+    power = block_sums(hover, drawn, VEHICLE).power[:, 0, 1:, 0]
     away = (power / power.mean(axis=0) - 1.0) ** 2 * mean ** 2 / variance
     assert len(away) > 80 and away.mean(axis=0) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(away)))
 
 
 def test_much_too_much_power_counts_as_gap_in_a_single_block_of_the_lowest_bands():
     """Noise that is just as strong as on average leaves nothing of it, or, where it is taken four times, as much."""
-    made, noise = flight(2.56), with_values("imu_noise", factor=2.0)
-    mean, variance = (np.where(x > 0.0, x, np.nan) for x in random_power(study(), made, [noise]))
-    sums, no_noise = block_sums(made, np.zeros((len(made), 13)), VEHICLE), np.zeros(sensor_rms(VEHICLE).shape)
+    hover, noise = flight(2.56), with_values("imu_noise", factor=2.0)
+    mean, variance = (np.where(x > 0.0, x, np.nan) for x in random_power(study(), hover, [noise]))
+    sums, no_noise = block_sums(hover, np.zeros((len(hover), 13)), VEHICLE), np.zeros(sensor_rms(VEHICLE).shape)
     of_right, of_four = (SumsWith(*(replace(sums, power=x) for x in (mean, n * mean, n ** 2 * variance)))
                          for n in (1.0, 4.0))
     right, four = of_right.mean_square(no_noise), of_four.mean_square(no_noise)

@@ -74,14 +74,12 @@ def diagnose_command(real: tuple[str, ...], vehicle_name: str | None, baseline: 
                                                  vehicle_named, real, baseline)
             if json_path:
                 output.write_json(json_path, diagnosis.plain(), force)
-            if report:
+            if report or plots:
                 from airtouch.report import gap_report
-
+            if report:
                 bar("report")
                 gap_report.write_diagnosis(report, diagnosis, command=typed(NAMES_SHOWN), force=force)
             if plots:
-                from airtouch.report import gap_report
-
                 drawn = gap_report.write_plots(plots, diagnosis.curves, force)
     diagnosed = 1
     if each:

@@ -59,11 +59,11 @@ def with_mean_thrust(vehicle: Vehicle, flights: Sequence[Flight], fitted: Fitted
 
 def lift_note(vehicle: Vehicle, flights: Sequence[Flight], terms: Terms) -> list[str]:
     """A note where the vehicle with these terms leaves a mean lift of more than MOST_LIFT_LEFT in flights."""
-    left = float(np.mean([_mean_lift(f, terms) for f in _in_air(vehicle, flights)] or [0.0]))
-    if abs(left) <= MOST_LIFT_LEFT:
+    lift = float(np.mean([_mean_lift(f, terms) for f in _in_air(vehicle, flights)] or [0.0]))
+    if abs(lift) <= MOST_LIFT_LEFT:
         return []
-    return [f"the vehicle as declared has far too {'little' if left > 0.0 else 'much'} thrust for its mass in the "
-            f"baseline flights ({left:+.2f} m/s^2 are left): check mass_kg and the thrust in the vehicle file"]
+    return [f"the vehicle as declared has far too {'little' if lift > 0.0 else 'much'} thrust for its mass in the "
+            f"baseline flights ({lift:+.2f} m/s^2 are left): check mass_kg and the thrust in the vehicle file"]
 
 
 class _InAir(NamedTuple):
@@ -75,8 +75,8 @@ class _InAir(NamedTuple):
 
 def _in_air(vehicle: Vehicle, flights: Sequence[Flight]) -> list[_InAir]:
     """The flights that are in the air for longer than take-off and landing."""
-    every = [_InAir(ReplayedFlight(f, vehicle), f.usable & ~np.isin(f.phase, NOT_IN_MEAN)) for f in flights]
-    return [f for f in every if f.samples.any()]
+    replayed = [_InAir(ReplayedFlight(f, vehicle), f.usable & ~np.isin(f.phase, NOT_IN_MEAN)) for f in flights]
+    return [f for f in replayed if f.samples.any()]
 
 
 def _mean_lift(in_air: _InAir, terms: Sequence[Term]) -> float:

@@ -40,6 +40,12 @@ def faded(ratio, height, fade):
 
 
 @jit
+def lifting_thrust(s, i, mean_thrust, joint):
+    """Thrust, N, that the mean lift of rotor i multiplies: its own (joint 0), the mean of all (1), or between them."""
+    return s[at.THRUST + i] + joint * (mean_thrust - s[at.THRUST + i])
+
+
+@jit
 def leaving(s, memory):
     """Thrust, N, times how far the drone is half beyond the end of a surface that was below all of it (0 to 1)."""
     far = 0.0
@@ -90,8 +96,7 @@ def ground_effect(p, s, memory, generator, out):
         spin = 1.0 if i % 2 == 0 else -1.0
         draw = alike + (left if i >= 2 else -left) + (rear if i == 1 or i == 2 else -rear) + spin * cross
         unsteady = p[STRENGTH] * s[at.THRUST + i] * p[TURBULENCE] * rough * draw
-        thrust = s[at.THRUST + i] + p[JOINT] * (mean_thrust - s[at.THRUST + i])
-        force = p[STRENGTH] * thrust * lift + unsteady
+        force = p[STRENGTH] * lifting_thrust(s, i, mean_thrust, p[JOINT]) * lift + unsteady
         out[2] += force
         out[3] += s[at.ROTOR_Y + i] * force
         out[4] -= s[at.ROTOR_X + i] * force
@@ -99,8 +104,7 @@ def ground_effect(p, s, memory, generator, out):
     if p[EVEN] > 0.0:
         shared = 0.25 * (memory[LIFT] + memory[LIFT + 1] + memory[LIFT + 2] + memory[LIFT + 3])
         for i in range(4):
-            thrust = s[at.THRUST + i] + p[JOINT] * (mean_thrust - s[at.THRUST + i])
-            force = p[STRENGTH] * thrust * p[EVEN] * (shared - memory[LIFT + i])
+            force = p[STRENGTH] * lifting_thrust(s, i, mean_thrust, p[JOINT]) * p[EVEN] * (shared - memory[LIFT + i])
             out[2] += force
             out[3] += s[at.ROTOR_Y + i] * force
             out[4] -= s[at.ROTOR_X + i] * force
