@@ -85,7 +85,9 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     of_mean, bounds = effect.parameters[name], {p.name: p.high for p in random_part.effect.parameters}
     strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_STRENGTH)
     high = strength if of_mean.high is None else max(of_mean.high, strength)
-    of_random = {k: replace(effect.parameters[k], value=value / strength) for k, value in fitted.items()}
+    of_variant = {k: random_part.values[k] for variant in random_part.signature.random_variants for k in variant}
+    of_random = {k: replace(effect.parameters[k], value=value)
+                 for k, value in {**of_variant, **{k: value / strength for k, value in fitted.items()}}.items()}
     parameters = {**effect.parameters, name: replace(of_mean, value=strength, high=high), **of_random}
     return NamedEffect(effect.name, parameters, effect.seconds)
 

@@ -29,6 +29,9 @@ from airtouch.gap.study import Study
 
 FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more adds time, and the table knows the rest
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
+#: standard deviation, natural steps, from which on a flight shows nothing of a parameter; chosen: that of ground effect
+#: is 0.02 to 0.4 where flights pass over a platform, 1.5 and more where they do not
+MOST_UNSURE = 1.0
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 #: kinds of logs that only a vehicle or its ground station writes, never a simulator
 RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
@@ -52,7 +55,8 @@ def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStren
     return ApparentStrengths(
         {name: candidate.strength.mean for name, candidate in known.items()},
         {name: _strength_error(data, candidate) for name, candidate in known.items()},
-        nameless_nats(trial, None) / data.seconds, passing_sizes(data, without))
+        nameless_nats(trial, None) / data.seconds, passing_sizes(data, without),
+        frozenset(name for name, candidate in known.items() if _is_hidden(candidate)))
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
@@ -77,6 +81,12 @@ def is_recorded(flight: Flight) -> bool:
 def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:
     """The apparent strengths of one nominal flight."""
     return apparent_strengths(Data(study, [flight]), without)
+
+
+def _is_hidden(judged: Hypothesis) -> bool:
+    """Whether the flight shows nothing of an effect that acts near surfaces alone, as it stays away from them."""
+    return strength_term(judged.terms).signature.near_surfaces \
+        and float(np.sqrt(judged.strength.variance.min())) > MOST_UNSURE
 
 
 def _strength_error(data: Data, judged: Hypothesis) -> np.ndarray:

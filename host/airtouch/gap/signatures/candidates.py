@@ -38,7 +38,7 @@ def all_candidates(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     out: dict[str, list[Terms]] = {name: [(t,) for t in terms(name)] for name in EFFECTS if name not in without}
     for name, signature in SIGNATURES.items():
         if name in out and signature.without_random is not None:
-            random: list[Terms] = [(*v, random_part_of(name)) for v in out[name]]
+            random: list[Terms] = [(*v, part) for part in random_parts_of(name) for v in out[name]]
             out[name] = random if name in ALWAYS_RANDOM else out[name] + random
     for name, companion in COMPANIONS.items():
         if name in out and companion not in without:
@@ -74,10 +74,16 @@ def shows_in(effect: Effect) -> str:
 
 
 def random_part_of(name: str) -> Term:
-    """The random part of an effect, where and when its mean part acts."""
-    effect = get(name)
-    values = effect.values({"strength": 1.0, **(SIGNATURES[name].without_random or {})})
-    return Term(effect, SPECTRUM, ("turbulence",), values, True)
+    """The first variant of the random part of an effect."""
+    return random_parts_of(name)[0]
+
+
+def random_parts_of(name: str) -> list[Term]:
+    """The variants of the random part of an effect, where and when its mean part acts."""
+    effect, signature = get(name), SIGNATURES[name]
+    return [Term(effect, SPECTRUM, ("turbulence",),
+                 effect.values({"strength": 1.0, **(signature.without_random or {}), **variant}), True)
+            for variant in signature.random_variants]
 
 
 def strength_term(hypothesis: Sequence[Term]) -> Term:
@@ -126,8 +132,9 @@ def terms_of(effect: NamedEffect) -> list[Term]:
         return [term]
     (strength,), part = term.signature.free, random_part_of(effect.name)
     at_strength_1 = {k: term.values[strength] * term.values[k] for k in part.free}
+    of_variant = {k: term.values[k] for variant in term.signature.random_variants for k in variant}
     return [replace(term, values={**term.values, **without}),
-            replace(part, values={**part.values, **at_strength_1}, gate=effect.seconds)]
+            replace(part, values={**part.values, **of_variant, **at_strength_1}, gate=effect.seconds)]
 
 
 def _random(effect: Effect) -> bool:

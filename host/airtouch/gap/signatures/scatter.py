@@ -38,13 +38,14 @@ class ApparentStrengths:
 
     strengths: scaled parameters (k,) by effect; errors: the standard deviation (k,) that each estimate has by
     chance; rate: nats a second that the nameless model gains; passing: size (`size_of`) of each effect that comes
-    and goes.
+    and goes; hidden: effects that the flight could not show, as ground effect high above the ground.
     """
 
     strengths: Mapping[str, np.ndarray]
     errors: Mapping[str, np.ndarray]
     rate: float
     passing: Mapping[str, float] = field(default_factory=dict)
+    hidden: frozenset[str] = frozenset()
 
 
 def size_of(rate: float, strength: np.ndarray) -> float:

@@ -48,7 +48,8 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     worth = own.freedom if simulated else min(own.freedom, RECORDED_WORTH)
     update = Update(own, known, worth)
     means = _updated_means(update)
-    rms = _updated_rms(update, means, math.sqrt(widening), LEAST if simulated else LEAST_RECORDED)
+    least = LEAST if simulated else LEAST_RECORDED
+    rms = _updated_rms(update, means, math.sqrt(widening), least) | _of_hidden(known, own)
     passing = {n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()}
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
@@ -125,6 +126,17 @@ def _updated_rms(update: Update, means: Mapping[str, np.ndarray], widening: floa
         exact = rows and not any(f.errors[name].any() for f in rows)
         rms[name] = np.maximum(own_rms, np.maximum(prior, least) if exact else least)
     return rms
+
+
+def _of_hidden(known: Sequence[ApparentStrengths], own: Scatter) -> dict[str, np.ndarray]:
+    """Scatter (k,) of the effects that no flight of the baseline could show: none, so that chance alone counts.
+
+    The class's is that of flights which could: the authors' nominal ones have the ground effect of their platforms, 0.1
+    to 0.3 of the published curve. A baseline high above the ground says nothing of it, and what a flight near the
+    ground has of it is news. known: the flights of the baseline; own: the class's scatter.
+    """
+    hidden = frozenset.intersection(*(f.hidden for f in known)) if known else frozenset()
+    return {name: np.full(len(own.rms[name]), LEAST) for name in sorted(hidden) if name in own.rms}
 
 
 def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -55,6 +55,7 @@ class Signature:
     shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
     commands_only: whether it changes what the controller commands and nothing of what the logged commands lead to.
     at_edges: whether it shows in what a flight does at edges.
+    near_surfaces: whether it acts near surfaces alone, so that a flight high above them shows nothing of it.
     scales_torque: whether it only multiplies torque, and would shrink any trim.
     spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
     loss_runs: for what loses samples in runs, the parameters that say so.
@@ -63,6 +64,7 @@ class Signature:
     What is beside it:
     without_random: values at which the effect has no random part, for a mean part whose random part is a term of its
     own; None for an effect without a random part.
+    random_variants: values of the random part that are tried one by one.
     always_random: whether the effect is only tried with its random part, because the mean alone has other names.
     companion: the effect that a variant has beside it; "" without one.
     several_by: parameter of which each value is an effect of its own, several of which may act together; "" for none.
@@ -79,11 +81,13 @@ class Signature:
     own_scatter: float = 0.0
     commands_only: bool = False
     at_edges: bool = False
+    near_surfaces: bool = False
     scales_torque: bool = False
     spectrum: str = ""
     loss_runs: LossRuns | None = None
     may_pass: bool = False
     without_random: Mapping[str, float] | None = None
+    random_variants: tuple[Mapping[str, float], ...] = ({},)
     always_random: bool = False
     companion: str = ""
     several_by: str = ""
@@ -128,7 +132,8 @@ SIGNATURES: dict[str, Signature] = {
         ("strength",), variants=tuple({"fade": fade, "even": together, "joint": together}
                                       for together in (0.0, 1.0) for fade in (0.0, 0.06, 0.0875, 0.129)),
         shape=Shape("fade", (0.06, 0.0875, 0.105, 0.129, 0.16, 0.22, 0.0)), without_random={"turbulence": 0.0},
-        at_edges=True,
+        # no yaw torque, or that of rotors under another vehicle (the default of `downwash`)
+        random_variants=_each("swirl", 0.0, 0.01), at_edges=True, near_surfaces=True,
         # the height over an edge comes from one late, noisy range reading for all rotors: 13 simulated flights of
         # opened sealed sets
         own_scatter=0.07),

@@ -214,7 +214,9 @@ def _variants_to_fit(best: PricedVariant, variants: Sequence[PricedVariant], goo
     """
     if best.terms[0].shows_in != MEAN:
         return [v for v in variants if _same(v.terms[0], best.terms[0])]
-    return [v for v in variants if not good_means or any(_same(v.terms[0], mean) for mean in good_means)]
+    (random,) = random_of(best.terms)
+    return [v for v in variants if _same(random_of(v.terms)[0], random)
+            and (not good_means or any(_same(v.terms[0], mean) for mean in good_means))]
 
 
 def _hypothesis_of(start: RoundStart, screened: ScreenedRandom) -> Hypothesis:
