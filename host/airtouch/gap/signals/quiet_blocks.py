@@ -14,15 +14,17 @@ QUIET_BINS = slice(2, 31)  #: bins of 0.8 to 12 Hz, in which a step of the set-p
 #: a set-point stepped where the modelled torque has more than this multiple of the power of the calm blocks of its
 #: flight, which nominal flights give (`are_quiet`); chosen
 STEPPED_TORQUE = 2.0
-CALM = 0.25  #: fraction of a flight's blocks, the quietest ones, that are taken to hold no step; chosen
+#: fraction of a flight's blocks, the quietest ones and one at least, that are taken to hold no step; chosen, small, as
+#: most blocks of a short flight over an edge hold one
+CALM = 0.1
 MOST_ROUNDS = 4  #: of the search for quiet blocks; chosen
 
 
 class QuietPower(NamedTuple):
     """Power of the modelled torque in those blocks of nominal flights that hold no step.
 
-    mean (bins, 3): its mean, (rad/s^2)^2/Hz; calm (3,): power in QUIET_BINS, as a multiple of that mean, that the
-    quietest quarter (CALM) of a flight's blocks does not exceed: the median of the flights.
+    mean (bins, 3): its mean, (rad/s^2)^2/Hz; calm (3,): power in QUIET_BINS, as a multiple of that mean, of a
+    flight's calm blocks (`_calm`): the median of the flights.
     """
 
     mean: np.ndarray
@@ -42,7 +44,7 @@ def estimate_quiet_power(modelled: Sequence[np.ndarray], power: np.ndarray) -> t
         before = quiet
         median = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0)
         mean = median / np.log(2.0)  # of an exponential law
-        calm = np.median([np.quantile(_over(mean, m), CALM, axis=0) for m in modelled if len(m)], axis=0)
+        calm = np.median([_calm(_over(mean, m)) for m in modelled if len(m)], axis=0)
         nominal = QuietPower(mean, calm)
         quiet = np.concatenate([are_quiet(m, nominal) for m in modelled])
         if np.array_equal(quiet, before) or not quiet.any(axis=0).all():
@@ -59,9 +61,14 @@ def are_quiet(modelled: np.ndarray, nominal: QuietPower) -> np.ndarray:
     if not len(modelled):
         return np.zeros((0, 3), bool)
     power = _over(nominal.mean, modelled)
-    return power < STEPPED_TORQUE * np.quantile(power, CALM, axis=0) / nominal.calm
+    return power < STEPPED_TORQUE * _calm(power) / nominal.calm
 
 
 def _over(mean: np.ndarray, modelled: np.ndarray) -> np.ndarray:
     """Power (blocks, 3) of the modelled torque (blocks, bins, 3) over the mean one (bins, 3), in QUIET_BINS."""
     return (np.abs(modelled) ** 2 / np.maximum(mean, VANISHING_POWER))[:, QUIET_BINS].mean(axis=1)
+
+
+def _calm(power: np.ndarray) -> np.ndarray:
+    """Power (3,) that the quietest blocks of a flight (CALM of them) do not exceed. power: (blocks, 3), not empty."""
+    return np.quantile(power, CALM, axis=0, method="lower")
