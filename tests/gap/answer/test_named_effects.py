@@ -17,9 +17,10 @@ from gap_flights import fly
 def unsteady(strength, part_strength, turbulence):
     """A ground effect of a strength (0.1 either way), with a random part that was fitted at a strength of its own."""
     effect = NamedEffect("ground_effect", {"strength": Quantity(strength, strength - 0.1, strength + 0.1),
-                                           "turbulence": Quantity(0.0), "fade": Quantity(0.06)})
+                                           "turbulence": Quantity(0.0), "fade": Quantity(0.06),
+                                           "swirl": Quantity(0.0, unit="m")})
     term = random_part_of("ground_effect")
-    term = replace(term, values={**term.values, "strength": part_strength, "turbulence": turbulence})
+    term = replace(term, values={**term.values, "strength": part_strength, "turbulence": turbulence, "swirl": 0.01})
     return with_random_part(effect, term).parameters
 
 
@@ -28,6 +29,7 @@ def test_random_force_of_mean_and_part_together_is_that_of_the_part(strength, pa
     """The force of the part is its strength times its turbulence."""
     both = unsteady(strength, part_strength, 0.2)
     assert both["strength"] == Quantity(strength, strength - 0.1, strength + 0.1) and both["fade"].value == 0.06
+    assert both["swirl"] == Quantity(0.01, unit="m"), "the variant of the random part is named with it"
     assert both["strength"].value * both["turbulence"].value == pytest.approx(part_strength * 0.2)
 
 

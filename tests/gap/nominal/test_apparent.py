@@ -1,5 +1,6 @@
 """ApparentStrengths strengths of effects in a simulated flight that has none."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,10 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS, apparent_strengths, evenly_chosen, is_recorded
 from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.signature import MEAN
+from airtouch.simulation import signals as at
+from airtouch.simulation.effects import EFFECTS
 from gap_flights import fly
+from hovers import FLOOR, hover
 
 
 def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
@@ -30,6 +34,17 @@ def test_an_effect_pressed_to_none_says_nothing_of_how_far(study):
                 free += 1
                 assert error > 1e-4, name
     assert pressed >= 2 and free >= 2
+
+
+@pytest.mark.parametrize(("height", "hidden"), [(1.0, True), (0.06, False)])
+def test_a_flight_high_above_the_ground_shows_nothing_of_ground_effect(height, hidden):
+    flown = hover(7, length_s=20.0)
+    signals = flown.signals.copy()
+    for place in (at.LOWER_HEIGHT, at.UPPER_HEIGHT):
+        signals[:, place:place + 4] = height + 0.01 * np.sin(np.arange(len(signals)) / 30.0)[:, None]
+    others = [name for name in EFFECTS if name != "ground_effect"]
+    apparent = apparent_strengths(Data(FLOOR, [replace(flown, signals=signals)]), without=others)
+    assert apparent.hidden == ({"ground_effect"} if hidden else set())
 
 
 def flights(count, meta):

@@ -67,6 +67,12 @@ def test_a_block_is_quiet_up_to_a_multiple_of_the_calm_ones_of_its_flight_at_any
     np.testing.assert_array_equal(quiet, np.tile([[True], [True], [True], [False]], 3))
 
 
+def test_one_calm_block_of_a_short_flight_tells_the_steps_in_all_others():
+    """A pass over an edge lasts some blocks, most of them with a step."""
+    torque = np.sqrt([15.0, 17.0, 1.0, 14.0, 16.0])[:, None, None] * np.ones((5, BINS, 3))
+    np.testing.assert_array_equal(are_quiet(torque, EVEN)[:, 0], [False, False, True, False, False])
+
+
 def test_what_is_outside_the_bins_of_steps_does_not_count():
     torque = np.ones((4, BINS, 3))
     torque[1, :QUIET_BINS.start] = torque[1, QUIET_BINS.stop:] = 100.0

@@ -40,11 +40,13 @@ def test_gains_are_tried_together_and_one_by_one():
 
 
 def test_a_ground_effect_is_tried_without_and_with_its_random_part():
+    """The turbulence turns the vehicle about its vertical axis in one variant, and does not in the other."""
     variants = all_candidates()["ground_effect"]
-    half = len(variants) // 2
-    assert all(kinds(v) == [("ground_effect", MEAN, False)] for v in variants[:half])
-    assert [v[:1] for v in variants[half:]] == variants[:half]
-    assert all(kinds(v[1:]) == [("ground_effect", SPECTRUM, True)] for v in variants[half:])
+    steady, *unsteady = (variants[i:i + len(variants) // 3] for i in range(0, len(variants), len(variants) // 3))
+    assert all(kinds(v) == [("ground_effect", MEAN, False)] for v in steady)
+    assert [[v[:1] for v in part] for part in unsteady] == [steady, steady]
+    assert all(kinds(v[1:]) == [("ground_effect", SPECTRUM, True)] for part in unsteady for v in part)
+    assert [{v[1].values["swirl"] for v in part} for part in unsteady] == [{0.0}, {0.01}]
     assert all(v[0].values["turbulence"] == 0.0 for v in variants)
 
 
@@ -103,9 +105,11 @@ def test_several_gains_are_the_term_in_which_all_of_them_are_free():
 def test_a_named_effect_is_a_steady_mean_and_a_random_part_with_all_of_its_force(name, strength, turbulence):
     """The random force is the strength times the turbulence; it acts in the seconds of the effect."""
     seconds = (("one.csv", 1.0, 2.0),)
-    named = NamedEffect(name, {"strength": Quantity(strength), "turbulence": Quantity(turbulence)}, seconds)
+    named = NamedEffect(name, {"strength": Quantity(strength), "turbulence": Quantity(turbulence),
+                               "swirl": Quantity(0.01, unit="m")}, seconds)
     mean, *random = terms_of(named)
     assert (mean.shows_in, mean.values["turbulence"], mean.values["strength"]) == (MEAN, 0.0, strength)
     assert [(t.shows_in, t.gate) for t in random] == [(SPECTRUM, seconds)] * (turbulence > 0.0)
     for part in random:
         assert part.values["strength"] * part.values["turbulence"] == pytest.approx(strength * turbulence)
+        assert part.values["swirl"] == 0.01

@@ -1,5 +1,7 @@
 """The yardstick of nominal flights against closed forms and drawn flights."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -55,6 +57,19 @@ def test_a_measure_that_no_baseline_flight_has_stays_that_of_the_class():
     scatter = scatter_of(flights, True, vehicle)
     assert vehicle_class.passing[UNSTEADY_LIFT][0] < 0.0
     assert scatter.passing[UNSTEADY_LIFT] == pytest.approx(vehicle_class.passing[UNSTEADY_LIFT])
+
+
+def test_an_effect_that_no_baseline_flight_could_show_has_no_scatter():
+    """The class's is that of flights which could; one that could show it among the baseline is enough for it."""
+    of_class = table()["crazyflie, flow deck, radio log"]
+    still = {k: 0.0 * v for k, v in of_class.rms.items()}
+    unknown = {**still, "ground_effect": np.array([NOBODY_KNOWS])}
+    known = ApparentStrengths(still, unknown, 0.0)
+    high = replace(known, hidden=frozenset({"ground_effect"}))
+    of_all, of_most = (scatter_of(flights, True, of_class.vehicle) for flights in ([high] * 4, [high] * 3 + [known]))
+    assert of_all.rms["ground_effect"] == LEAST < LEAST_RECORDED < of_most.rms["ground_effect"]
+    for name in of_most.rms.keys() - {"ground_effect"}:
+        assert of_all.rms[name] == pytest.approx(of_most.rms[name]), name
 
 
 def test_recorded_flights_are_never_taken_for_simulated_ones():

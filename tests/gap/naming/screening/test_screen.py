@@ -7,6 +7,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.judging import trial_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD
 from airtouch.gap.naming.records import Hypothesis
+from airtouch.gap.naming.screening import screen
 from airtouch.gap.naming.screening.screen import addable, screen_random, start_of
 from airtouch.gap.signatures.candidates import all_candidates, random_of
 from hovers import FLOOR, hover
@@ -54,3 +55,14 @@ def test_mean_terms_about_as_good_are_fitted_with_the_random_part():
     _, fitted = screen_random(start, [v for v in variants if random_of(v.terms)], means, every_random=False)
     shape_of = {i: terms[0].values for i, terms in enumerate(shapes)}
     assert {i for v in fitted for i, values in shape_of.items() if v.terms[0].values == values} == {0, 1}
+
+
+@pytest.mark.parametrize("swirl", [0.0, 0.01])
+def test_of_the_variants_of_a_random_part_the_best_is_fitted(monkeypatch, swirl):
+    """Turbulence that turns the vehicle, or that does not, gains more, whatever lift stands beside it."""
+    gains = {swirl: 29.0, 0.01 - swirl: 20.0}
+    monkeypatch.setattr(screen, "judge_random", lambda _, term: (gains[term.values["swirl"]], np.ones(1)))
+    start = start_of(trial_of(Data(FLOOR, [hover(7, length_s=10.0)])), None)
+    variants = [v for v in addable("ground_effect", CANDIDATES["ground_effect"], ()) if random_of(v.terms)]
+    _, fitted = screen_random(start, variants, [], every_random=False)
+    assert [v.terms[1].values["swirl"] for v in fitted] == [swirl] * (len(variants) // 2)
