@@ -1,7 +1,8 @@
-"""Prints the lift near the floor in neural-swarm's flights, by regressions, and the strengths that channels show.
+"""Prints the lift near the ground in recorded flights, by regressions, and the strengths that channels show.
 
-    python tools/diagnosis/gap_lift.py [FLIGHTS]    # 7 s
+    python tools/diagnosis/gap_lift.py [FLIGHTS]    # neural-swarm's, 7 s
     python tools/diagnosis/gap_lift.py [FLIGHTS] --by-channel    # of days 19 and 20 alone, 30 s
+    python tools/diagnosis/gap_lift.py [FLIGHTS] --passes    # the authors' over their platform, folds 0 to 2, 5 s
 
 Prints, for each day and vehicle, in how many of neural-swarm's flights a regression is within a quarter of the measured
 lift; the figures are in host/docs/gap-real.md. It takes the vertical force that the commanded thrust does not explain
@@ -10,11 +11,16 @@ or one of free values at FREE_M, which knows nothing of the measured one. 1 is t
 
 --by-channel: the strength of `ground_effect` (the preset's is 1) that the diagnosis's spectra show in one channel and
 band alone, beside the vehicle that it calibrates.
+
+--passes: the lift of each pass is the mean vertical force over the platform that the commanded thrust does not explain,
+less that of free air before it. Beside it the lift that neural-swarm's 34 g vehicle has as high above standing as the
+down range reads over what it reads at rest, and how far short the down range would have to read for both to be one.
 """
 
 import argparse
 import csv
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +31,9 @@ from scipy.signal import lfilter
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.cli.shared.progress import with_bar
-from airtouch.detector.evaluation.data.folds import BUILD_DAYS
+from airtouch.detector.evaluation.crossval import readable_flights
+from airtouch.detector.evaluation.data.dataset import collect
+from airtouch.detector.evaluation.data.folds import BUILD_DAYS, BUILD_FOLDS
 from airtouch.errors import in_one_line
 from airtouch.gap.evidence.cells import REPLAY_VIEW, cell_numbers
 from airtouch.gap.evidence.data import Data
@@ -35,7 +43,8 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.nominal.calibrate import calibrated
 from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.study import Study
-from airtouch.logs import read
+from airtouch.logs import read, true_edges
+from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import effects
 from recordings.folder import add_folder
 from recordings.swarm_lift import CLOSE, CURVE, CURVE_M, HEIGHTS_M
@@ -53,6 +62,33 @@ PRESETS = {"ns-34g": "crazyflie-34g", "ns-67g": "frame-67g"}  #: of `ground_effe
 PLACES = (("force_z", 0), ("force_z", 1), ("torque_x", 1), ("torque_x", 2), ("torque_y", 1), ("torque_y", 2))
 
 
+#: samples of free air before the entry, and of the platform between entry and exit that are clear of both; no source:
+#: round numbers
+BEFORE, CLEAR = slice(-150, -20), slice(20, -10)
+ENTERING = slice(5, 15)  #: samples after the entry in which the down range reads too little; no source: round numbers
+#: m, limits of the down range over the platform, over that at rest, by which passes are grouped; no source: about equal
+#: numbers but in the last, where two flights were higher than the rest
+READING_M = (0.0, 0.018, 0.022, 0.04, 0.15)
+
+
+class Pass(NamedTuple):
+    """A pass over a platform.
+
+    resting_m, entering_m, over_m: median down range at rest, 0.05 to 0.15 s after the entry, and over the platform;
+    lift: over the platform, as a fraction of the weight.
+    """
+
+    resting_m: float
+    entering_m: float
+    over_m: float
+    lift: float
+
+    @property
+    def above_standing_m(self) -> float:
+        """Down range over the platform, over that at rest."""
+        return self.over_m - self.resting_m
+
+
 class Unexplained(NamedTuple):
     """Height above standing (n,), m, and the vertical force there over the weight that the thrust does not explain."""
 
@@ -65,13 +101,18 @@ def unexplained(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float) ->
     voltage = gaussian_filter1d(np.nan_to_num(flight.log["vbat_V"], nan=float(np.nanmedian(flight.log["vbat_V"]))),
                                 SMOOTH, mode="nearest")
     thrust = vehicle.thrust(flight.pwm).sum(axis=1) * (voltage / vehicle.nominal_voltage_v) ** vehicle.voltage_exponent
-    pole = 1.0 - PERIOD_S / LAG_S
-    lagged = lfilter([1.0 - pole], [1.0, -pole], thrust, zi=[pole * thrust[0]])[0]
+    lagged = _lagged(thrust)
     weight = vehicle.mass_kg * vehicle.gravity_mps2
     force = flight.acceleration[:, 2] * vehicle.mass_kg / weight - lagged / weight
     height = flight.log["z_m"] - standing_m
     usable = flight.usable & np.isfinite(height) & (flight.phase != GROUND) & (height > LOWEST_M)
     return Unexplained(height[usable], force[usable])
+
+
+def _lagged(thrust: np.ndarray) -> np.ndarray:
+    """A thrust (n,) after the motors' lag."""
+    pole = 1.0 - PERIOD_S / LAG_S
+    return lfilter([1.0 - pole], [1.0, -pole], thrust, zi=[pole * thrust[0]])[0]
 
 
 def regressed_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float, curve: np.ndarray) -> float:
@@ -87,6 +128,46 @@ def free_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float) -> n
     hats = [np.interp(height, FREE_M, one) for one in np.eye(len(FREE_M))[:-1]]
     values = np.linalg.lstsq(np.column_stack([np.ones(len(height)), *hats]), force, rcond=None)[0][1:]
     return np.interp(HEIGHTS_M, FREE_M, [*values, 0.0])
+
+
+def passed(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
+    """The first pass of a flight over a platform; None without one, or where it is too short."""
+    entry, leave = [*(e.sample for e in true_edges(log)), 0, 0][:2]
+    if leave - entry < 2 * CLEAR.start or entry < -BEFORE.start:
+        return None
+    flight = ready(log, vehicle)
+    thrust = _lagged(vehicle.thrust(flight.pwm).sum(axis=1))
+    before, over = slice(entry + BEFORE.start, entry + BEFORE.stop), slice(entry + CLEAR.start, leave + CLEAR.stop)
+    force = flight.acceleration[:, 2] / vehicle.gravity_mps2 - thrust / np.nanmean(thrust[before])
+    entering = slice(entry + ENTERING.start, entry + ENTERING.stop)
+    down = flight.log["zrange_m"]
+    return Pass(*(float(np.nanmedian(down[part])) for part in (flight.phase == GROUND, entering, over)),
+                float(np.nanmean(force[over]) - np.nanmean(force[before])))
+
+
+def _print_passes(folder: Path) -> None:
+    """The lift of the authors' low passes, by the down range."""
+    vehicle, curve = vehicles.load(vehicles.DEFAULT_VEHICLE), CURVE["ns-34g"]
+    read, _ = readable_flights(files := collect([folder]))
+    low = [f for f in files if f.path in read and f.condition.fold in BUILD_FOLDS and f.condition.height == "low"
+           and f.condition.wind in (None, "none")]
+    passes = [p for p in (passed(read[f.path], vehicle) for f in low) if p is not None]
+    print("| down range over that at rest | passes | lift, % of the weight | neural-swarm's 34 g vehicle there | "
+          "it has this lift higher by |")
+    print("|---|---|---|---|---|")
+    for least, most in pairwise(READING_M):
+        some = np.array([(p.above_standing_m, p.lift) for p in passes if least <= p.above_standing_m < most])
+        if not len(some):
+            continue
+        height, lift = some.mean(axis=0)
+        error = some[:, 1].std(ddof=1) / np.sqrt(len(some)) if len(some) > 1 else np.nan
+        same_lift = np.interp(-lift, -curve, CURVE_M)
+        print(f"| {100 * least:.1f} to {100 * most:.1f} cm, {100 * height:.1f} in the mean | {len(some)} | "
+              f"{100 * lift:.1f} +- {100 * error:.1f} | {100 * np.interp(height, CURVE_M, curve):.1f} | "
+              f"{100 * (same_lift - height):.1f} cm |")
+    resting, entering = (100.0 * np.median([getattr(p, name) for p in passes]) for name in ("resting_m", "entering_m"))
+    print(f"\ndown range, medians of {len(passes)} passes: {resting:.1f} cm at rest, {entering:.1f} cm at 0.1 s after "
+          "the entry")
 
 
 def strengths(study: Study, flight: Flight, preset: str) -> np.ndarray:
@@ -153,8 +234,14 @@ def main() -> None:
     """Print the ratio of fitted to measured lift near the floor in recorded flights, by day and vehicle."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_folder(parser, name="flights")
-    parser.add_argument("--by-channel", action="store_true", help="print the strength that each channel shows alone")
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--by-channel", action="store_true", help="print the strength that each channel shows alone")
+    what.add_argument("--passes", action="store_true", help="print the lift of the authors' low passes")
     options = parser.parse_args()
+    if options.passes:
+        check_data_set(options.flights / "airtouch")
+        _print_passes(options.flights / "airtouch")
+        return
     folder = options.flights / "neuralswarm"
     check_data_set(folder)
     if options.by_channel:

@@ -101,6 +101,14 @@ def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:
     return [*rows, ("+ vehicle as calibrated", list(on.values()))]
 
 
+def how_far(diagnosis: Mapping[str, Any]) -> str:
+    """The verdict of a diagnosis with the gap and the fraction closed, JSON-ready as `Diagnosis.plain` gives it."""
+    names = " and ".join(e["name"] for e in diagnosis["effects"]) or diagnosis["verdict"]
+    gap, shrink = diagnosis["gap"], diagnosis["shrink"]
+    closed = f", closed {shrink['value']:.0%} [{shrink['low']:.0%}, {shrink['high']:.0%}]" if shrink else ""
+    return f"{names}, gap {gap['before']:.2f} -> {gap['after']:.2f} floors{closed}"
+
+
 def scene_text(effects: Effects) -> str:
     """TOML of the training scenario with these effects, and no others."""
     path = Path(scenario.__file__).parent / "scenarios" / f"{simulated.SCENARIO}.toml"
@@ -209,9 +217,10 @@ def main() -> None:
     groups = cut({f: read[f.path] for f in files if f.path in read}, group_names)
     chains = []
     for name, group in zip(group_names, groups, strict=True):
-        store = options.out / f"diagnosis_{name}.json"
-        chains.append(chain(diagnoses(group, store, options.force)))
+        found = diagnoses(group, options.out / f"diagnosis_{name}.json", options.force)
+        chains.append(chain(found))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
+        print(f"folds {name}, low passes: {how_far(found['close'])}", flush=True)
     if not options.diagnose:
         print_table(chains, group_names, groups, options)
 

@@ -9,6 +9,8 @@ import pytest
 from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.nominal.calibrate import calibrated
+from airtouch.logs import true_edges
+from airtouch.simulation import batch
 from gap_flights import VEHICLE as FLOWN
 from gap_flights import fly
 from tools.diagnosis import gap_lift
@@ -55,3 +57,17 @@ def test_each_channel_shows_the_strength_that_was_flown():
     flight, = fly(1, 5, [("ground_effect", {"strength": 2.9, "fade": 0.0875, "turbulence": 0.0})])
     strengths = gap_lift.strengths(study, flight, "crazyflie-34g")
     assert strengths[:2] == pytest.approx([2.0, 2.0], abs=0.4) and strengths[3] == pytest.approx(2.0, abs=0.6)
+
+
+def test_the_lift_over_a_platform_is_what_no_thrust_explains_there():
+    """Two hundredths of the weight more force between the edges than a simulated flight has."""
+    flight = next(log for log in batch.flights("paper-low", 3, seed=4, workers=1) if len(true_edges(log)) == 2)
+    entry, leave = (e.sample for e in true_edges(flight))
+    lifted = flight["acc_z_mps2"].copy()
+    lifted[entry:leave] += 0.02 * FLOWN.gravity_mps2
+    without, with_lift = (gap_lift.passed(log, FLOWN) for log in (flight, flight.with_columns({"acc_z_mps2": lifted})))
+    assert with_lift.lift - without.lift == pytest.approx(0.02, abs=1e-9)
+    over = flight["zrange_m"][entry + 20:leave - 10]
+    assert without.over_m == np.median(over) and without.above_standing_m == without.over_m - without.resting_m
+    assert without.resting_m == pytest.approx(np.median(flight["zrange_m"][:50]), abs=0.002)
+    assert gap_lift.passed(flight.slice(0, entry), FLOWN) is None

@@ -117,3 +117,11 @@ def test_a_diagnosis_is_replaced_when_the_new_one_is_there(tmp_path):
     with pytest.raises(AirTouchError, match="0 flights"):
         gap_training.diagnoses({}, store, force=True)
     assert store.read_text() == '{"all": 1}'
+
+
+def test_how_far_a_diagnosis_closes_the_gap_is_said_in_a_line():
+    found = {"verdict": "effect", "effects": [{"name": "wind"}, {"name": "mass"}],
+             "gap": {"before": 1.5, "after": 1.1}, "shrink": {"value": 0.8, "low": 0.7, "high": 0.9}}
+    assert gap_training.how_far(found) == "wind and mass, gap 1.50 -> 1.10 floors, closed 80% [70%, 90%]"
+    none = {"verdict": "none", "effects": [], "gap": {"before": 1.2, "after": 1.2}, "shrink": None}
+    assert gap_training.how_far(none) == "none, gap 1.20 -> 1.20 floors"
