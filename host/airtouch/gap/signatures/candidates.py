@@ -52,8 +52,9 @@ def passing_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
     without, out = set(without), {}
     for name in PASSING:
         if name in EFFECTS and name not in without:
-            random = () if SIGNATURES[name].without_random is None else (random_part_of(name),)
-            out[name] = [(t, *random) for t in terms(name)]
+            random: list[Terms] = [()] if SIGNATURES[name].without_random is None else \
+                [(part,) for part in random_parts_of(name)]
+            out[name] = [(t, *part) for part in random for t in terms(name)]
     return out
 
 

@@ -131,7 +131,8 @@ EFFECT = Effect(
      Parameter("pitch", "1", 1.0, 0.0, 2.0, None,
                "unsteady lift of front against rear, over that of four independent rotors; below 1 the rotors of one "
                "side share streaks of air"),
-     Parameter("swirl", "m", 0.0, 0.0, 0.2, 0.0, "unsteady yaw torque over unsteady lift of a rotor"),
+     Parameter("swirl", "m", 0.0, 0.0, 0.2, 0.0, "unsteady yaw torque over unsteady lift of a rotor",
+               "authors' passes over a platform: about 0.01; neural-swarm's flights over a wide floor: none"),
      Parameter("even", "1", 0.0, 0.0, 1.0, None,
                "how far the rotors share their mean lift evenly; 1: no pitch moment where an edge covers some of them",
                "at exits the authors' flights pitch the other way than a partly covered drone should"),
