@@ -76,7 +76,7 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
 
     The random part was fitted at a strength of its own (1, that of the published curve), while the simulator has one
     strength for mean and random part: the random part's parameters are divided by it. A mean too weak to carry them
-    within their bounds is raised to the least that does.
+    within their bounds is raised to the least that does. What tells the random part's variants apart stays as it is.
     """
     if effect.name != random_part.name:
         return effect
@@ -85,9 +85,9 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     of_mean, bounds = effect.parameters[name], {p.name: p.high for p in random_part.effect.parameters}
     strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_STRENGTH)
     high = strength if of_mean.high is None else max(of_mean.high, strength)
-    of_variant = {k: random_part.values[k] for variant in random_part.signature.random_variants for k in variant}
-    of_random = {k: replace(effect.parameters[k], value=value)
-                 for k, value in {**of_variant, **{k: value / strength for k, value in fitted.items()}}.items()}
+    values = {k: value / strength for k, value in fitted.items()} \
+        | {k: random_part.values[k] for k in random_part.signature.random_varied}
+    of_random = {k: replace(effect.parameters[k], value=value) for k, value in values.items()}
     parameters = {**effect.parameters, name: replace(of_mean, value=strength, high=high), **of_random}
     return NamedEffect(effect.name, parameters, effect.seconds)
 

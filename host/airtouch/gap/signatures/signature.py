@@ -114,6 +114,11 @@ class Signature:
         return self.spectrum in (IMU_NOISE, ROTOR_LINES)
 
     @property
+    def random_varied(self) -> tuple[str, ...]:
+        """The parameters that tell the variants of the random part apart."""
+        return tuple(dict.fromkeys(name for variant in self.random_variants for name in variant))
+
+    @property
     def class_values(self) -> tuple[float, ...]:
         """The values of `class_by` in the variants, in their order."""
         return tuple(v[self.class_by] for v in self.variants) if self.class_by else ()
