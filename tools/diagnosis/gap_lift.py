@@ -141,7 +141,8 @@ def passed(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
     force = flight.acceleration[:, 2] / vehicle.gravity_mps2 - thrust / np.nanmean(thrust[before])
     entering = slice(entry + ENTERING.start, entry + ENTERING.stop)
     down = flight.log["zrange_m"]
-    resting_m, entering_m, over_m = (float(np.nanmedian(down[part])) for part in (flight.phase == GROUND, entering, over))
+    resting_m, entering_m, over_m = (float(np.nanmedian(down[part]))
+                                     for part in (flight.phase == GROUND, entering, over))
     return Pass(resting_m, entering_m, over_m, float(np.nanmean(force[over]) - np.nanmean(force[before])))
 
 
