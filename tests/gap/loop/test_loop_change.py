@@ -34,8 +34,8 @@ CHANGES = {
     "late sensors": ("sensor_latency", {"delay": 0.002}),
 }
 #: by which the share of torque may be off, of itself where it is above 1; of late sensors, whose share is least where
-#: it turns most, more
-CLOSE, LATE = 0.1, 0.2
+#: it turns most, more: 0.19 to 0.20, as a twentieth to a quarter of the blocks are taken for calm
+CLOSE, LATE = 0.1, 0.22
 
 
 def fly(active, numbers, vehicle=None):
