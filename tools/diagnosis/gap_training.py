@@ -10,9 +10,9 @@ On the authors' flights, in AIRTOUCH_FLIGHTS or ../shared/flights; the table is 
    (what is there only close to a surface, which the rest of the flight would drown; same day, propellers and
    battery). Kept in OUT/diagnosis_*.json until --force; --diagnose stops there.
 2. Training. `best` on flights simulated without any effect, then with the effects that were named added one after
-   another at their fitted values, then with the vehicle as calibrated in free air, and for reference with
-   the scenario's own effects, set by hand. The same missions in every row. Models are kept in OUT/models; one is
-   made anew only when the flights that it was trained on come out differently.
+   another at their fitted values, those of the low passes first, then with the vehicle as calibrated in free air,
+   and for reference with the scenario's own effects, set by hand. The same missions in every row. Models are kept in
+   OUT/models; one is made anew only when the flights that it was trained on come out differently.
 3. Test. What was found in one group is tested on real flights of the other: every flight is tested, and never by
    what saw it. Prints a Markdown table: errors with 95 % intervals by bootstrap over flights, and how far the
    simulated flights are from those tested (mean difference of the spectra of nine channels in dB, before and
@@ -84,7 +84,7 @@ def diagnoses(flights: Flights, store: Path, force: bool = False) -> dict[str, A
 
 
 def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:
-    """(what is added, all effects then on): nothing, what all flights share, what is close by, calibration.
+    """(what is added, all effects then on): nothing, what is close by, what all flights share, calibration.
 
     diagnosis: as `diagnoses` gives it.
 
@@ -92,7 +92,7 @@ def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:
     """
     rows: list[tuple[str, Effects]] = [("nothing", [])]
     on: dict[tuple[str, float | None], tuple[str, dict[str, float]]] = {}
-    for effect in [e for part in ("all", "close") for e in diagnosis[part]["effects"]]:
+    for effect in [e for part in ("close", "all") for e in diagnosis[part]["effects"]]:
         values = {k: q["value"] for k, q in effect["parameters"].items()}
         if on.setdefault((effect["name"], values.get("rotor")), (effect["name"], values))[1] is values:
             rows.append((f"+ `{effect['name']}`", list(on.values())))

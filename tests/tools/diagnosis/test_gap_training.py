@@ -47,8 +47,8 @@ def test_effects_are_added_one_after_another_and_once():
                  "calibration": [["weak_motor", {"rotor": 1, "thrust_loss": 0.5}], ["inertia", {"fraction": 0.1}]]}
     rows = gap_training.chain(diagnoses)
     assert [len(on) for _, on in rows] == [0, 1, 2, 3, 4]
-    assert rows[-1][1] == [("gust", {"rms": 0.1}), ("weak_motor", {"rotor": 1, "thrust_loss": 0.1}),
-                           ("weak_motor", {"rotor": 4, "thrust_loss": 0.2}), ("inertia", {"fraction": 0.1})]
+    assert rows[-1][1] == [("gust", {"rms": 0.9}), ("weak_motor", {"rotor": 4, "thrust_loss": 0.2}),
+                           ("weak_motor", {"rotor": 1, "thrust_loss": 0.1}), ("inertia", {"fraction": 0.1})]
 
 
 def test_no_flight_is_in_two_groups():
