@@ -33,6 +33,12 @@ def test_a_passing_effect_is_said_to_act_for_the_whole_flight_in_the_simulator()
     assert "acts for the whole flight" in step.text
 
 
+def test_what_is_named_without_a_baseline_is_not_to_be_trained_on():
+    without = next_steps(replace(diagnosis(), baseline=(), indistinguishable=()), WITH_GYRO, VEHICLE)
+    assert without[0].text.startswith("Give flights") and "do not train" in without[1].text
+    assert not any("do not train" in step.text for step in advice(diagnosis()))
+
+
 @pytest.mark.parametrize("vehicle", [replace(VEHICLE, name="my drone"), replace(VEHICLE, mass_kg=0.05)])
 def test_a_vehicle_of_a_file_of_its_own_is_named_by_a_file(vehicle):
     """`--vehicle` takes no name of a vehicle that is not built in, and would take another one for one that is."""
