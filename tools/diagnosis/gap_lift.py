@@ -43,10 +43,11 @@ from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight, ready
 from airtouch.gap.nominal.calibrate import calibrated
 from airtouch.gap.signals.channels import COLUMN
 from airtouch.gap.study import Study
-from airtouch.logs import read, true_edges
+from airtouch.logs import read
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import effects
 from recordings.folder import add_folder
+from recordings.passes import first_edges, in_still_air
 from recordings.swarm_lift import CLOSE, CURVE, CURVE_M, HEIGHTS_M
 
 #: z_m of each vehicle on the floor, m (the data's SOURCE.md)
@@ -130,9 +131,9 @@ def free_lift(flight: Flight, vehicle: vehicles.Vehicle, standing_m: float) -> n
     return np.interp(HEIGHTS_M, FREE_M, [*values, 0.0])
 
 
-def passed(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
+def first_pass(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
     """The first pass of a flight over a platform; None without one, or where it is too short."""
-    entry, leave = [*(e.sample for e in true_edges(log)), 0, 0][:2]
+    entry, leave = first_edges(log)
     if leave - entry < 2 * CLEAR.start or entry < -BEFORE.start:
         return None
     flight = ready(log, vehicle)
@@ -149,21 +150,21 @@ def passed(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
 def _print_passes(folder: Path) -> None:
     """The lift of the authors' low passes, by the down range."""
     vehicle, curve = vehicles.load(vehicles.DEFAULT_VEHICLE), CURVE["ns-34g"]
-    read, _ = readable_flights(files := collect([folder]))
-    low = [f for f in files if f.path in read and f.condition.fold in BUILD_FOLDS and f.condition.height == "low"
-           and f.condition.wind in (None, "none")]
-    passes = [p for p in (passed(read[f.path], vehicle) for f in low) if p is not None]
+    low, _ = readable_flights([f for f in collect([folder]) if in_still_air(f)
+                               and f.condition.fold in BUILD_FOLDS and f.condition.height == "low"])
+    passes = [p for p in (first_pass(log, vehicle) for log in low.values()) if p is not None]
     print("| down range over that at rest | passes | lift, % of the weight | neural-swarm's 34 g vehicle there | "
           "it has this lift higher by |")
     print("|---|---|---|---|---|")
     for least, most in pairwise(READING_M):
-        some = np.array([(p.above_standing_m, p.lift) for p in passes if least <= p.above_standing_m < most])
-        if not len(some):
+        group = [p for p in passes if least <= p.above_standing_m < most]
+        if not group:
             continue
-        height, lift = some.mean(axis=0)
-        error = some[:, 1].std(ddof=1) / np.sqrt(len(some)) if len(some) > 1 else np.nan
+        lifts = [p.lift for p in group]
+        height, lift = np.mean([p.above_standing_m for p in group]), np.mean(lifts)
+        error = np.std(lifts, ddof=1) / np.sqrt(len(group)) if len(group) > 1 else np.nan
         same_lift = np.interp(-lift, -curve, CURVE_M)
-        print(f"| {100 * least:.1f} to {100 * most:.1f} cm, {100 * height:.1f} in the mean | {len(some)} | "
+        print(f"| {100 * least:.1f} to {100 * most:.1f} cm, {100 * height:.1f} in the mean | {len(group)} | "
               f"{100 * lift:.1f} +- {100 * error:.1f} | {100 * np.interp(height, CURVE_M, curve):.1f} | "
               f"{100 * (same_lift - height):.1f} cm |")
     resting, entering = (100.0 * np.median([getattr(p, name) for p in passes]) for name in ("resting_m", "entering_m"))

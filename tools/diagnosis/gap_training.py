@@ -44,7 +44,7 @@ from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.logs.files import make_folder, write_bytes
 from airtouch.logs.flight_log import FlightLog
 from airtouch.simulation import scenario
-from recordings.passes import apart_db, pieces
+from recordings.passes import apart_db, in_still_air, pieces
 
 MOST, MOST_PASSES = 7, 8  #: flights and passes that are diagnosed, evenly spaced: the diagnosis judges on 210 s at most
 #: names and parameters of effects
@@ -67,7 +67,7 @@ def diagnoses(flights: Flights, store: Path, force: bool = False) -> dict[str, A
     force: they are made anew, and the file is replaced when they are there.
     """
     if force or not store.is_file():
-        calm = {f: log for f, log in flights.items() if f.condition.wind in (None, "none")}
+        calm = {f: log for f, log in flights.items() if in_still_air(f)}
         close = [log for f, log in calm.items() if f.condition.height == "low"]
         cuts = [pair for pair in map(pieces, evenly_spaced(close, MOST_PASSES)) if pair is not None]
         if not cuts:
@@ -101,7 +101,7 @@ def chain(diagnosis: Mapping[str, Any]) -> list[tuple[str, Effects]]:
     return [*rows, ("+ vehicle as calibrated", list(on.values()))]
 
 
-def how_far(diagnosis: Mapping[str, Any]) -> str:
+def closure_text(diagnosis: Mapping[str, Any]) -> str:
     """The verdict of a diagnosis with the gap and the fraction closed, JSON-ready as `Diagnosis.plain` gives it."""
     names = " and ".join(e["name"] for e in diagnosis["effects"]) or diagnosis["verdict"]
     gap, shrink = diagnosis["gap"], diagnosis["shrink"]
@@ -217,10 +217,10 @@ def main() -> None:
     groups = cut({f: read[f.path] for f in files if f.path in read}, group_names)
     chains = []
     for name, group in zip(group_names, groups, strict=True):
-        found = diagnoses(group, options.out / f"diagnosis_{name}.json", options.force)
-        chains.append(chain(found))
+        both = diagnoses(group, options.out / f"diagnosis_{name}.json", options.force)
+        chains.append(chain(both))
         print(f"folds {name}: {' '.join(what for what, _ in chains[-1])}", flush=True)
-        print(f"folds {name}, low passes: {how_far(found['close'])}", flush=True)
+        print(f"folds {name}, low passes: {closure_text(both['close'])}", flush=True)
     if not options.diagnose:
         print_table(chains, group_names, groups, options)
 

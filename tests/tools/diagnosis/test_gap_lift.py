@@ -65,9 +65,10 @@ def test_the_lift_over_a_platform_is_what_no_thrust_explains_there():
     entry, leave = (e.sample for e in true_edges(flight))
     lifted = flight["acc_z_mps2"].copy()
     lifted[entry:leave] += 0.02 * FLOWN.gravity_mps2
-    without, with_lift = (gap_lift.passed(log, FLOWN) for log in (flight, flight.with_columns({"acc_z_mps2": lifted})))
+    without, with_lift = (gap_lift.first_pass(log, FLOWN)
+                          for log in (flight, flight.with_columns({"acc_z_mps2": lifted})))
     assert with_lift.lift - without.lift == pytest.approx(0.02, abs=1e-9)
     over = flight["zrange_m"][entry + 20:leave - 10]
     assert without.over_m == np.median(over) and without.above_standing_m == without.over_m - without.resting_m
     assert without.resting_m == pytest.approx(np.median(flight["zrange_m"][:50]), abs=0.002)
-    assert gap_lift.passed(flight.slice(0, entry), FLOWN) is None
+    assert gap_lift.first_pass(flight.slice(0, entry), FLOWN) is None

@@ -120,8 +120,8 @@ def test_a_diagnosis_is_replaced_when_the_new_one_is_there(tmp_path):
 
 
 def test_how_far_a_diagnosis_closes_the_gap_is_said_in_a_line():
-    found = {"verdict": "effect", "effects": [{"name": "wind"}, {"name": "mass"}],
-             "gap": {"before": 1.5, "after": 1.1}, "shrink": {"value": 0.8, "low": 0.7, "high": 0.9}}
-    assert gap_training.how_far(found) == "wind and mass, gap 1.50 -> 1.10 floors, closed 80% [70%, 90%]"
+    effect = {"verdict": "effect", "effects": [{"name": "wind"}, {"name": "mass"}],
+              "gap": {"before": 1.5, "after": 1.1}, "shrink": {"value": 0.8, "low": 0.7, "high": 0.9}}
+    assert gap_training.closure_text(effect) == "wind and mass, gap 1.50 -> 1.10 floors, closed 80% [70%, 90%]"
     none = {"verdict": "none", "effects": [], "gap": {"before": 1.2, "after": 1.2}, "shrink": None}
-    assert gap_training.how_far(none) == "none, gap 1.20 -> 1.20 floors"
+    assert gap_training.closure_text(none) == "none, gap 1.20 -> 1.20 floors"

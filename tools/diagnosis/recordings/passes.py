@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import welch
 
 from airtouch import logs
+from airtouch.detector.evaluation.data.dataset import FlightFile
 from airtouch.detector.shared import channels
 from airtouch.logs.flight_log import FlightLog
 
@@ -22,7 +23,12 @@ SHORTEST_FREE, SHORTEST_OVER = 400, 100  #: samples of free air and of platform,
 FREE = slice(-320, -20)  #: samples before an entry whose spectrum is that of free air: 3 s, clear of the edge
 
 
-def _edges(log: FlightLog) -> tuple[int, int]:
+def in_still_air(file: FlightFile) -> bool:
+    """Whether no fan blew, as far as the manifest knows."""
+    return file.condition.wind in (None, "none")
+
+
+def first_edges(log: FlightLog) -> tuple[int, int]:
     """Samples of the first entry and its exit; zeros where there are none."""
     first, last, *_ = [*(e.sample for e in logs.true_edges(log)), 0, 0]
     return first, last
@@ -34,7 +40,7 @@ def pieces(log: FlightLog) -> tuple[FlightLog, FlightLog] | None:
     The pass begins well before the platform, so that noise that is there only close to a surface is not taken
     for noise that is always there.
     """
-    entry, leave = _edges(log)
+    entry, leave = first_edges(log)
     start = int(np.argmax(logs.airborne(log))) + SETTLED
     if entry - BEFORE - start < SHORTEST_FREE or leave - entry < SHORTEST_OVER:
         return None
@@ -44,7 +50,7 @@ def pieces(log: FlightLog) -> tuple[FlightLog, FlightLog] | None:
 def spectra(log: FlightLog) -> np.ndarray:
     """dB (2, bands, 9) of the nine channels in the 3 s before an entry and from it to the exit; NaN if short."""
     out = np.full((2, len(BANDS_HZ) - 1, 9), np.nan)
-    entry, leave = _edges(log)
+    entry, leave = first_edges(log)
     values = channels.nine_channels(log)
     for k, (a, b) in enumerate(((max(entry + FREE.start, 0), entry + FREE.stop), (entry, leave))):
         if b - a >= WINDOW and np.isfinite(values[a:b]).all():

@@ -21,8 +21,8 @@ URI = "radio://0/80/2M/E7E7E7E7E7"  #: radio address of a Crazyflie as it ships
 MISSIONS = {"hover": "hover", "cruise": "there-and-back", "over platform": "sweep"}
 #: of an effect that is named without a baseline; a detector trained with the noise that the authors' flights are given
 #: so finds no edge (host/docs/gap-findings.md, "Trained on what today's diagnosis finds")
-NOT_TO_TRAIN_ON = (" Without a baseline it may stand for all in which the flights differ from the declared vehicle: do "
-                   "not train a detector on it.")
+TRAINING_WARNING = (" Without a baseline it may stand for all in which the flights differ from the declared vehicle: "
+                    "do not train a detector on it.")
 
 
 def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, extrapolated: bool = False,
@@ -47,7 +47,7 @@ def next_steps(answer: Diagnosis, flights: Sequence[Flight], vehicle: Vehicle, e
         always = " There it acts for the whole flight, not in its seconds alone."
         steps.append(NextStep(
             f"Switch on {names} with these parameters in the simulator, and fly it again."
-            + always * any(e.seconds for e in answer.effects) + NOT_TO_TRAIN_ON * (not answer.baseline),
+            + always * any(e.seconds for e in answer.effects) + TRAINING_WARNING * (not answer.baseline),
             simulate_command(answer.effects, argument)))
     if answer.verdict == "none" and extrapolated:
         steps.append(NextStep(

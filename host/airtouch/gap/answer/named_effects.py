@@ -86,7 +86,7 @@ def with_random_part(effect: NamedEffect, random_part: Term) -> NamedEffect:
     strength = max(of_mean.value, *(value / bounds[k] for k, value in fitted.items()), LEAST_STRENGTH)
     high = strength if of_mean.high is None else max(of_mean.high, strength)
     values = {k: value / strength for k, value in fitted.items()} \
-        | {k: random_part.values[k] for k in random_part.signature.random_varied}
+        | {k: random_part.values[k] for k in random_part.signature.random_variant_parameters}
     of_random = {k: replace(effect.parameters[k], value=value) for k, value in values.items()}
     parameters = {**effect.parameters, name: replace(of_mean, value=strength, high=high), **of_random}
     return NamedEffect(effect.name, parameters, effect.seconds)

@@ -31,7 +31,7 @@ FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more ad
 NEUTRAL = 1e-6  #: scaled strength of an effect that only has one sign, below which it is at its bound of none
 #: standard deviation, natural steps, from which on a flight shows nothing of a parameter; chosen: that of ground effect
 #: is 0.02 to 0.4 where flights pass over a platform, 1.5 and more where they do not
-MOST_UNSURE = 1.0
+HIDDEN_DEVIATION = 1.0
 NOBODY_KNOWS = 1e6  #: standard deviation of a scaled parameter of which the data say nothing
 #: kinds of logs that only a vehicle or its ground station writes, never a simulator
 RECORDERS = frozenset({"authors", "crazypad", "imrclab", "usd"})
@@ -86,7 +86,7 @@ def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> Appare
 def _is_hidden(judged: Hypothesis) -> bool:
     """Whether the flight shows nothing of an effect that acts near surfaces alone, as it stays away from them."""
     return strength_term(judged.terms).signature.near_surfaces \
-        and float(np.sqrt(judged.strength.variance.min())) > MOST_UNSURE
+        and float(np.sqrt(judged.strength.variance.min())) > HIDDEN_DEVIATION
 
 
 def _strength_error(data: Data, judged: Hypothesis) -> np.ndarray:

@@ -24,7 +24,7 @@ class QuietPower(NamedTuple):
     """Power of the modelled torque in those blocks of nominal flights that hold no step.
 
     mean (bins, 3): its mean, (rad/s^2)^2/Hz; calm (3,): power in QUIET_BINS, as a multiple of that mean, of a
-    flight's calm blocks (`_calm`): the median of the flights.
+    flight's calm blocks (`_calm_power`): the median of the flights.
     """
 
     mean: np.ndarray
@@ -36,15 +36,16 @@ def estimate_quiet_power(modelled: Sequence[np.ndarray], power: np.ndarray) -> t
 
     modelled: torque (blocks, bins, 3) of each flight; power (blocks, bins, 3): of all blocks. In turn the power is
     measured on quiet blocks, and blocks are quiet that are not much stronger, until the same ones are quiet twice, for
-    MOST_ROUNDS at most. The fourth round changes at most 6 % of the entries (host/docs/looks.md, 2026-11-26 07:29).
-    Where flights differ so much that an axis has no quiet block, there is no power to measure, and the search ends.
+    MOST_ROUNDS at most. The fourth round changes at most 6 % of the entries (with CALM a quarter: host/docs/looks.md,
+    2026-11-26 07:29). Where flights differ so much that an axis has no quiet block, there is no power to measure, and
+    the search ends.
     """
     quiet = np.ones((len(power), 3), bool)
     for _ in range(MOST_ROUNDS):
         before = quiet
         median = np.nanmedian(np.where(quiet[:, None], power, np.nan), axis=0)
         mean = median / np.log(2.0)  # of an exponential law
-        calm = np.median([_calm(_over(mean, m)) for m in modelled if len(m)], axis=0)
+        calm = np.median([_calm_power(_over(mean, m)) for m in modelled if len(m)], axis=0)
         nominal = QuietPower(mean, calm)
         quiet = np.concatenate([are_quiet(m, nominal) for m in modelled])
         if np.array_equal(quiet, before) or not quiet.any(axis=0).all():
@@ -61,7 +62,7 @@ def are_quiet(modelled: np.ndarray, nominal: QuietPower) -> np.ndarray:
     if not len(modelled):
         return np.zeros((0, 3), bool)
     power = _over(nominal.mean, modelled)
-    return power < STEPPED_TORQUE * _calm(power) / nominal.calm
+    return power < STEPPED_TORQUE * _calm_power(power) / nominal.calm
 
 
 def _over(mean: np.ndarray, modelled: np.ndarray) -> np.ndarray:
@@ -69,6 +70,6 @@ def _over(mean: np.ndarray, modelled: np.ndarray) -> np.ndarray:
     return (np.abs(modelled) ** 2 / np.maximum(mean, VANISHING_POWER))[:, QUIET_BINS].mean(axis=1)
 
 
-def _calm(power: np.ndarray) -> np.ndarray:
+def _calm_power(power: np.ndarray) -> np.ndarray:
     """Power (3,) that the quietest blocks of a flight (CALM of them) do not exceed. power: (blocks, 3), not empty."""
     return np.quantile(power, CALM, axis=0, method="lower")

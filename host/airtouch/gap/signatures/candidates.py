@@ -133,7 +133,7 @@ def terms_of(effect: NamedEffect) -> list[Term]:
         return [term]
     (strength,), part = term.signature.free, random_part_of(effect.name)
     at_strength_1 = {k: term.values[strength] * term.values[k] for k in part.free}
-    of_variant = {k: term.values[k] for k in term.signature.random_varied}
+    of_variant = {k: term.values[k] for k in term.signature.random_variant_parameters}
     return [replace(term, values={**term.values, **without}),
             replace(part, values={**part.values, **of_variant, **at_strength_1}, gate=effect.seconds)]
 

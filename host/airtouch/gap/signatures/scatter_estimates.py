@@ -49,7 +49,7 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     update = Update(own, known, worth)
     means = _updated_means(update)
     least = LEAST if simulated else LEAST_RECORDED
-    rms = _updated_rms(update, means, math.sqrt(widening), least) | _of_hidden(known, own)
+    rms = _updated_rms(update, means, math.sqrt(widening), least) | _of_hidden(update)
     passing = {n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()}
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
@@ -128,15 +128,16 @@ def _updated_rms(update: Update, means: Mapping[str, np.ndarray], widening: floa
     return rms
 
 
-def _of_hidden(known: Sequence[ApparentStrengths], own: Scatter) -> dict[str, np.ndarray]:
+def _of_hidden(update: Update) -> dict[str, np.ndarray]:
     """Scatter (k,) of the effects that no flight of the baseline could show: none, so that chance alone counts.
 
     The class's is that of flights which could: the authors' nominal ones have the ground effect of their platforms, 0.1
     to 0.3 of the published curve. A baseline high above the ground says nothing of it, and what a flight near the
-    ground has of it is news. known: the flights of the baseline; own: the class's scatter.
+    ground has of it is news.
     """
+    class_rms, known = update.own.rms, update.known
     hidden = frozenset.intersection(*(f.hidden for f in known)) if known else frozenset()
-    return {name: np.full(len(own.rms[name]), LEAST) for name in sorted(hidden) if name in own.rms}
+    return {name: np.full(len(class_rms[name]), LEAST) for name in sorted(hidden) if name in class_rms}
 
 
 def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

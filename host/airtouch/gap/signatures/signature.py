@@ -114,7 +114,7 @@ class Signature:
         return self.spectrum in (IMU_NOISE, ROTOR_LINES)
 
     @property
-    def random_varied(self) -> tuple[str, ...]:
+    def random_variant_parameters(self) -> tuple[str, ...]:
         """The parameters that tell the variants of the random part apart."""
         return tuple(dict.fromkeys(name for variant in self.random_variants for name in variant))
 

@@ -152,8 +152,8 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
 
     1. A candidate promises something where its random term or its best mean term gains more than HOPELESS nats; every
        one counts as such if `every_random`.
-    2. Where its variants begin with a mean term, each is fitted whose mean term is about as good as the best; each of
-       all where no mean term was screened by itself.
+    2. Where its variants begin with a mean term, each of those with the best random term is fitted whose mean term is
+       about as good as the best; each of them where no mean term was screened by itself.
     3. Where they begin with a random term, the best of them is fitted, without companion and with it.
     4. A candidate that promises nothing is a hypothesis as screened, unless it is among `means`, where it has one
        already.
