@@ -86,7 +86,8 @@ def _response(vehicle: Vehicle, calibration: tuple[Active, ...], loop: closed_lo
     if loop is None or any(n.flight.rates is None for n in replayed):
         return None
     outside = disturbed(loop.controllers, prepare(vehicle, calibration)[0][0], frequencies(AIR))
-    return response_of([_torque(n) for n in replayed], outside)
+    gyro_power = sensor_power(sensor_noise(vehicle), AIR)[:, TORQUE]
+    return response_of([_torque(n) for n in replayed], outside, gyro_power)
 
 
 def _under_response(replayed: NominalBlocks, vehicle: Vehicle, calibration: tuple[Active, ...],

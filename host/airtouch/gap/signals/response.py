@@ -11,9 +11,13 @@ frequency and axis: q is the H1 estimate, lowered by the noise in w and delibera
 dilution: Fuller, Measurement Error Models, 1987, chapter 1).
 
     E[y | w] = q w,  q = S_yw / S_ww                             from flights declared nominal: `Law.transfer`
-    q~ = q clip((coherence - NOISE) / NOISE, 0, 1)               0 where gyro noise in both makes q: `Law.coherent`
+    q~ = q clip((coherence - noise) / noise, 0, 1)               0 where gyro noise in both makes q: `Law.coherent`
     gap = y - q~ c w + what effects add                          c: ratio of q with effects to q without, `Law.ratio`,
                                                                  derived in `loop.torque_share`
+
+The controllers answer the gyro's noise too, so that y and w share it. Noise that is a share rho of the power of y alone
+makes a coherence of rho at most. So q is believed from `noise` on, the largest of DECLARED_DOUBT rho, NOISE and one over
+the number of blocks. In yaw, where a small torque takes large commands, y is hardly more than noise above 2 Hz.
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
@@ -43,10 +47,14 @@ FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a singl
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
-#: coherence up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this on it is
-#: believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says less of
-#: effects that act through the commands; with a smaller one noise of the gyro counts as a response
+#: coherence, at least, up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this
+#: on it is believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says
+#: less of effects that act through the commands; with a smaller one noise that the vehicle's file does not declare
+#: counts as a response
 NOISE = 0.2
+#: factor by which the power of the gyro's noise may be above the declared one; chosen. With a larger one more bins lose
+#: their q~; with 1 a yaw torque that is noise alone keeps some
+DECLARED_DOUBT = 2.0
 
 
 @dataclass(frozen=True)
@@ -190,12 +198,13 @@ class Response:
         return out
 
 
-def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed) -> Response | None:
+def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed, gyro_power: np.ndarray) -> Response | None:
     """The response of nominal flights from the torque of each; None for too few blocks, or too few quiet.
 
     The latter are few on an axis where flights differ in strength so much that none is like the others.
 
-    loop: what it makes of a torque from outside.
+    loop: what it makes of a torque from outside; gyro_power (bins, 3): of the gyro's noise in measured torque,
+    (rad/s^2)^2/Hz.
     """
     modelled = [t.modelled for t in torques]
     y, w = np.concatenate([t.measured for t in torques]), np.concatenate(modelled)
@@ -204,18 +213,19 @@ def response_of(torques: Sequence[TorqueSpectra], loop: Disturbed) -> Response |
     power, quiet = quiet_blocks.estimate_quiet_power(modelled, np.abs(w) ** 2)
     if quiet.sum(axis=0).min() < FEWEST_QUIET:
         return None
-    quiet_law, floor = _law(QUIET, y, w, quiet, loop, None)
+    quiet_law, floor = _law(QUIET, y, w, quiet, loop, gyro_power, None)
     stepped_law = None
     if (~quiet).any(axis=1).sum() >= FEWEST_OF_KIND:
-        stepped_law, _ = _law(STEPPED, y, w, ~quiet, loop, floor)
+        stepped_law, _ = _law(STEPPED, y, w, ~quiet, loop, gyro_power, floor)
     return Response(QuietPower(_smooth(power.mean), power.calm), quiet_law, stepped_law)
 
 
-def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, floor: np.ndarray | None,
-         ) -> tuple[Law, np.ndarray]:
+def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Disturbed, gyro_power: np.ndarray,
+         floor: np.ndarray | None) -> tuple[Law, np.ndarray]:
     """Law of the blocks of a kind, which are chosen for each axis, bool (blocks, 3), and their floor (bins, 3).
 
-    y, w: measured and modelled torque of all blocks. floor: to which the law weights them; None for their own.
+    y, w: measured and modelled torque of all blocks. gyro_power: see `response_of`. floor: to which the
+    law weights them; None for their own.
     """
     mask, count = chosen[:, None], np.maximum(chosen.sum(axis=0), 1)
 
@@ -223,11 +233,12 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
         """Mean (bins, 3) over the chosen blocks."""
         return (values * mask).sum(axis=0) / count
 
-    power = mean(np.abs(w) ** 2)
+    power, measured_power = mean(np.abs(w) ** 2), np.maximum(mean(np.abs(y) ** 2), VANISHING_POWER)
     q = mean(y * w.conj()) / np.maximum(power, VANISHING_POWER)
-    coherence = _smooth(np.abs(q) ** 2 * power / np.maximum(mean(np.abs(y) ** 2), VANISHING_POWER))
+    coherence = _smooth(np.abs(q) ** 2 * power / measured_power)
     transfer = _smooth(q.real) + 1j * _smooth(q.imag)
-    noise = np.maximum(NOISE, 1.0 / count)  # of n blocks of noise the coherence is 1/n by chance
+    of_gyro = DECLARED_DOUBT * _smooth(gyro_power / measured_power)
+    noise = np.maximum(of_gyro, np.maximum(NOISE, 1.0 / count))  # of n blocks of noise the coherence is 1/n by chance
     coherent = transfer * np.clip((coherence - noise) / noise, 0.0, 1.0)
     own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER))))
     enough = chosen.sum(axis=0) >= FEWEST_OF_KIND
