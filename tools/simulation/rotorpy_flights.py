@@ -81,7 +81,7 @@ class Label:
 def labels_of(each: int, nominal: int, seed: int) -> list[Label]:
     """The flights to make: two to calibrate on, so many with each effect, and so many without any."""
     rng = np.random.default_rng(seed)
-    cases = [("none", 0.0, "")] * nominal
+    cases: list[tuple[str, float, str]] = [("none", 0.0, "")] * nominal
     cases += [(name, float(rng.uniform(low, high)), unit) for name, (low, high, unit) in STRENGTHS.items()
               for _ in range(each)]
     order = rng.permutation(len(cases))
@@ -141,7 +141,8 @@ class Loop:
         self.sum_v = np.clip(self.sum_v + error * STEP_S, -0.6, 0.6)
         acceleration = np.array([3.0, 3.0, 6.0]) * error + np.array([0.8, 0.8, 4.0]) * self.sum_v
         pitch, roll = (np.clip(a / 9.81, -0.35, 0.35) for a in (acceleration[0], -acceleration[1]))
-        thrust = self.mass * np.clip(9.81 + acceleration[2], 2.0, 16.0) / max(np.cos(angles[0]) * np.cos(angles[1]), 0.6)
+        upright = max(np.cos(angles[0]) * np.cos(angles[1]), 0.6)
+        thrust = self.mass * np.clip(9.81 + acceleration[2], 2.0, 16.0) / upright
         rate_error = 7.0 * (np.array([roll, pitch, 0.0]) - angles) - rate
         self.sum_rate = np.clip(self.sum_rate + rate_error * STEP_S, -0.5, 0.5)
         torque = self.inertia * (np.array([28.0, 28.0, 12.0]) * rate_error + 25.0 * self.sum_rate)
@@ -188,16 +189,18 @@ def fly(label: Label) -> FlightLog:
     biases = [k * on["imu_bias"] * _direction(rng) for k in (0.25, 0.03)]
     late, old = (round(0.001 * on[k] / STEP_S) for k in ("act_delay", "latency"))
     commands, seen = [np.zeros(4)] * (late + 1), []
-    tone_phase, rows, resting, drift = rng.uniform(0.0, 2.0 * np.pi), [], True, np.zeros((2, 3))
+    turn, rows, resting, drift = rng.uniform(0.0, 2.0 * np.pi), [], True, np.zeros((2, 3))
     for step in range(round(course.total_s / STEP_S)):
         t = step * STEP_S
         rotation = Rotation.from_quat(state["q"])
         yaw, pitch, roll = rotation.as_euler("ZYX")
-        tone = on["vibration"] * np.sin(2.0 * np.pi * 287.3 * t + tone_phase)
+        turn += STEP_S * state["rotor_speeds"][0]
+        tone = on["vibration"] * np.sin(turn) * (not resting)
         gyro = state["w"] + noise * rng.normal(0.0, 0.006, 3) + biases[1] + 0.05 * tone
         drift += -STEP_S / DRIFT_S * drift + np.sqrt(2.0 * STEP_S / DRIFT_S) * DRIFT * rng.standard_normal((2, 3))
-        seen = [*seen, (state["x"] + drift[0] + rng.normal(0.0, 0.001, 3),
-                        state["v"] + drift[1] + rng.normal(0.0, 0.006, 3), np.array([roll, pitch, yaw]), gyro)][-old - 1:]
+        place = state["x"] + drift[0] + rng.normal(0.0, 0.001, 3)
+        velocity = state["v"] + drift[1] + rng.normal(0.0, 0.006, 3)
+        seen = [*seen, (place, velocity, np.array([roll, pitch, yaw]), gyro)][-old - 1:]
         flying = course.rise_s - 0.8 < t < course.land_s + 1.9
         pwm = loop.pwm(course.at(t), *seen[0]) if flying else np.zeros(4)
         commands = [*commands, pwm][-late - 1:]
@@ -207,8 +210,8 @@ def fly(label: Label) -> FlightLog:
             floor = course.floor(state["x"][0])
             down = (state["x"][2] - floor) / max(np.cos(roll) * np.cos(pitch), 0.5)
             rows.append(np.r_[acc + noise * rng.normal(0.0, 0.06, 3) + biases[0] + tone, gyro, pwm,
-                              np.round(down + 0.012 + rng.normal(0.0, 0.002), 3), seen[-1][1],
-                              seen[-1][0] + (0.0, 0.0, 0.012)])
+                              np.round(down + 0.012 + rng.normal(0.0, 0.002), 3), velocity,
+                              place + (0.0, 0.0, 0.012)])
         sag = on["battery_sag"] * (t / course.total_s)
         craft.factor = weak * (1.0 - sag) * (1.0 + _ground(on["ground_effect"], craft, state, rotation, course))
         if on["gust"]:
@@ -261,7 +264,7 @@ def main() -> None:
     """Make the flights, then the manifest."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, metavar="OUT")
-    parser.add_argument("--each", type=whole_number(0), default=3, help="flights with each effect (default %(default)s)")
+    parser.add_argument("--each", type=whole_number(0), default=3, help="flights an effect (default %(default)s)")
     parser.add_argument("--nominal", type=whole_number(0), default=12, help="without an effect (default %(default)s)")
     parser.add_argument("--seed", type=whole_number(0), default=0)
     options = parser.parse_args()

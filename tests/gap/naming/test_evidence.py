@@ -1,5 +1,7 @@
 """The evidence for an effect: its gain over the base, and no more than nominal flights and its bound leave it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,8 @@ def evidence(scatter, strength, gain=100.0):
     """Evidence for a mass of an exact strength that gains so many nats, 40 of them its base's."""
     exact = Strength(np.array([strength]), np.zeros((1, 1)))
     candidate = Hypothesis("mass", (terms("mass")[0],), gain, strength=exact)
-    return with_evidence(scatter, {"mass": candidate}, 40.0)["mass"].evidence
+    data = SimpleNamespace(study=SimpleNamespace(scatter=scatter))
+    return with_evidence(data, {"mass": candidate}, 40.0)["mass"].evidence
 
 
 def test_without_nominal_flights_the_gain_decides():

@@ -10,6 +10,8 @@ in them, and gains likelihood by it. So the gain alone names nothing. The rule, 
 The rarity is the log likelihood of the strength over that of nominal scatter and chance (`Scatter.evidence`). At its
 bound the model stretches to fit what another effect does. A passing effect has the same rule for its size
 (`passing_effect.passing_evidence`), and the relations of signals have an evidence of their own.
+
+The nominal scatter is that beyond chance. So the chance error of a strength counts beside it, a random effect's too.
 """
 
 from collections.abc import Mapping
@@ -17,30 +19,40 @@ from dataclasses import replace
 
 import numpy as np
 
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.problem import whole_of
+from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.naming.judging import at_bound
 from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signatures.candidates import strength_term
-from airtouch.gap.signatures.scatter import Scatter
-from airtouch.gap.signatures.signature import MEAN
+from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
 
-def with_evidence(scatter: Scatter | None, best: Mapping[str, Hypothesis], base_gain: float) -> dict[str, Hypothesis]:
-    """The best hypothesis of each candidate, by name, with its evidence.
-
-    scatter: of strengths in nominal flights, None where none were measured; base_gain: nats that the base gains.
-    """
-    return {name: replace(h, evidence=min(h.gain - base_gain, _limit(scatter, h))) for name, h in best.items()}
+def with_evidence(data: Data, best: Mapping[str, Hypothesis], base_gain: float) -> dict[str, Hypothesis]:
+    """The best hypothesis of each candidate, by name, with its evidence; base_gain: nats that the base gains."""
+    return {name: replace(h, evidence=min(h.gain - base_gain, _limit(data, h))) for name, h in best.items()}
 
 
-def _limit(scatter: Scatter | None, hypothesis: Hypothesis) -> float:
+def random_variance(data: Data, judged: Hypothesis, term: Term) -> np.ndarray:
+    """Variance (k,) by chance of the strength of a random effect; 0 where none was found. term: of `judged`."""
+    fitted = judged.fits[0].terms
+    same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
+    variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
+    return np.where(judged.strength.mean > 0.0, variance, 0.0)
+
+
+def _limit(data: Data, hypothesis: Hypothesis) -> float:
     """Nats of evidence that the strength of a hypothesis' newest effect allows; infinite where nothing limits it."""
-    own, strength = _own_term(hypothesis), hypothesis.strength
+    own, strength, scatter = _own_term(hypothesis), hypothesis.strength, data.study.scatter
     if own.shows_in == MEAN and at_bound(own, strength.mean).any():
         return 0.0
     if scatter is None:
         return np.inf
-    return scatter.evidence(hypothesis.name, strength.mean, strength.covariance, strength.half_difference)
+    covariance = strength.covariance
+    if own.shows_in == SPECTRUM and hypothesis.full:
+        covariance = np.diag(random_variance(data, hypothesis, own))
+    return scatter.evidence(hypothesis.name, strength.mean, covariance, strength.half_difference)
 
 
 def _own_term(hypothesis: Hypothesis) -> Term:

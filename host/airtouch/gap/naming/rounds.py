@@ -30,7 +30,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypo
     variants, not_fitted = _screen(start, candidates, progress, promising)
     fitted = map_on_two_cores(lambda v: _fit_variant(trial, v, base), variants)
     best = best_of_each([*fitted, *not_fitted], len(start.terms))
-    return with_evidence(trial.data.study.scatter, best, start.gain)
+    return with_evidence(trial.data, best, start.gain)
 
 
 def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Hypothesis]:

@@ -6,11 +6,10 @@ from functools import partial
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.problem import whole_of
-from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.flights.evenly import evenly_spaced
 from airtouch.gap.flights.fitness import log_kind
 from airtouch.gap.flights.flight import Flight
+from airtouch.gap.naming.evidence import random_variance
 from airtouch.gap.naming.judging import at_bound, trial_of
 from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.naming.rounds import every_strength
@@ -24,7 +23,6 @@ from airtouch.gap.signatures.candidates import all_candidates, strength_term
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter, size_of
 from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.gap.signatures.signature import CLOCK, PASSING, SPECTRUM
-from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import Study
 
 FLIGHTS = 4  #: nominal flights to which every effect is fitted; chosen: more adds time, and the table knows the rest
@@ -95,16 +93,8 @@ def _strength_error(data: Data, judged: Hypothesis) -> np.ndarray:
     if term.shows_in == CLOCK:
         return np.zeros(len(strength.mean))
     if term.shows_in == SPECTRUM:
-        return _random_error(data, judged, term)
+        return np.sqrt(random_variance(data, judged, term))
     low, _ = (term.among_all(b, -np.inf) for b in term.bounds())
     pressed = (low == 0.0) & (strength.mean < NEUTRAL)  # the data would have it below none: how far, nobody knows
     return np.where(at_bound(term, strength.mean) | pressed, NOBODY_KNOWS,
                     np.minimum(np.sqrt(strength.variance), NOBODY_KNOWS))
-
-
-def _random_error(data: Data, judged: Hypothesis, term: Term) -> np.ndarray:
-    """Standard deviation (k,) by chance of a random effect's strength; 0 where none was found."""
-    fitted = judged.fits[0].terms
-    same = next(t for t in fitted if t.name == term.name and t.shows_in == SPECTRUM)
-    variance = np.diag(strength_variance(data, whole_of(data), fitted, same))[:len(term.free)]
-    return np.sqrt(np.where(judged.strength.mean > 0.0, variance, 0.0))

@@ -15,9 +15,9 @@ dilution: Fuller, Measurement Error Models, 1987, chapter 1).
     gap = y - q~ c w + what effects add                          c: ratio of q with effects to q without, `Law.ratio`,
                                                                  derived in `loop.torque_share`
 
-The controllers answer the gyro's noise too, so that y and w share it. Noise that is a share rho of the power of y alone
-makes a coherence of rho at most. So q is believed from `noise` on, the largest of DECLARED_DOUBT rho, NOISE and one over
-the number of blocks. In yaw, where a small torque takes large commands, y is hardly more than noise above 2 Hz.
+The controllers answer the gyro's noise too, so that y and w share it. Where it makes a fraction rho of the power of y,
+the coherence that it makes is rho at most. So q is believed from `noise` on: the largest of rho, NOISE and one over
+the number of blocks. In yaw, where a small torque takes large commands, y above 2 Hz may be hardly more.
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
@@ -52,9 +52,6 @@ CUT_DOUBT = 0.3
 #: less of effects that act through the commands; with a smaller one noise that the vehicle's file does not declare
 #: counts as a response
 NOISE = 0.2
-#: factor by which the power of the gyro's noise may be above the declared one; chosen. With a larger one more bins lose
-#: their q~; with 1 a yaw torque that is noise alone keeps some
-DECLARED_DOUBT = 2.0
 
 
 @dataclass(frozen=True)
@@ -237,7 +234,7 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     q = mean(y * w.conj()) / np.maximum(power, VANISHING_POWER)
     coherence = _smooth(np.abs(q) ** 2 * power / measured_power)
     transfer = _smooth(q.real) + 1j * _smooth(q.imag)
-    of_gyro = DECLARED_DOUBT * _smooth(gyro_power / measured_power)
+    of_gyro = _smooth(gyro_power / measured_power)
     noise = np.maximum(of_gyro, np.maximum(NOISE, 1.0 / count))  # of n blocks of noise the coherence is 1/n by chance
     coherent = transfer * np.clip((coherence - noise) / noise, 0.0, 1.0)
     own_floor = np.exp(_smooth(np.log(np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER))))
