@@ -1,5 +1,6 @@
 """The evidence for an effect: its gain over the base, and no more than nominal flights and its bound leave it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,3 +68,15 @@ def test_halves_that_differ_lower_the_evidence():
     assert deviation.evidence == pytest.approx(4.5 * np.log1p((14.0 * weak / between) ** 2 / 8.0), rel=0.1)
     assert not deviation.is_named
     assert deviation.gain > LEAST_GAIN
+
+
+@pytest.mark.parametrize("seconds", [10.0, 40.0])
+def test_the_chance_error_of_a_noise_counts(seconds):
+    """Of n samples of white noise the rms is known to 1 / sqrt(2 n), so that no more than this is evidence."""
+    nominal = scattered(imu_noise=[1e-6])  # next to none beyond chance
+    selection, data = select_from([hover(3, louder=1.06, length_s=seconds)], ("imu_noise",), nominal)
+    noise = selection.single_effects["imu_noise"]
+    samples = 6.0 * 100.0 * seconds
+    off_by_chance = noise.strength.mean[0] * np.sqrt(2.0 * samples)
+    sure = with_evidence(data, {"imu_noise": replace(noise, gain=1000.0)}, 0.0)["imu_noise"]  # the gain limits nothing
+    assert 0.1 * 0.5 * off_by_chance ** 2 < sure.evidence < 0.5 * off_by_chance ** 2

@@ -21,6 +21,7 @@ from airtouch.gap.signals.spectra import AIR, frequencies
 
 BINS = len(frequencies(AIR))
 NO_LOOP = Disturbed(np.zeros((BINS, 3)), np.zeros((BINS, 3)))
+NO_NOISE = np.zeros((BINS, 3))
 
 
 def noise(rng, size, rms=1.0):
@@ -42,7 +43,7 @@ def torques(felt, commands):
 def test_share_is_that_of_errors_in_variables():
     rng = np.random.default_rng(1)
     felt, commands = flights(rng, 1.0, 1.0)
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     np.testing.assert_allclose(response.quiet_law.coherent.real, 1.0 / (1.0 + 1.0), atol=0.1)
     np.testing.assert_allclose(response.quiet_law.coherent.imag, 0.0, atol=0.1)
 
@@ -50,15 +51,27 @@ def test_share_is_that_of_errors_in_variables():
 def test_a_share_no_surer_than_noise_is_not_believed():
     rng = np.random.default_rng(5)
     felt, commands = flights(rng, 1.0, 3.0)  # coherence 1 / (1 + 9)
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     assert np.median(np.abs(response.quiet_law.coherent)) == 0.0
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.1, 0.5, 0.95])
+def test_gyro_noise_that_the_controllers_answer_is_no_response(fraction):
+    """Commands follow what was measured; of that `fraction` is known to be noise, and makes so much coherence alone."""
+    rng = np.random.default_rng(6)
+    felt = [noise(rng, (12, BINS, 3)) for _ in range(12)]
+    commands = [-0.1 * y for y in felt]  # coherence 1, q = -10
+    law = response_of(torques(felt, commands), NO_LOOP, np.full((BINS, 3), fraction)).quiet_law
+    np.testing.assert_allclose(law.transfer, -10.0, atol=1e-6)
+    believed = np.clip((1.0 - max(fraction, 0.2)) / max(fraction, 0.2), 0.0, 1.0)
+    np.testing.assert_allclose(np.median(law.coherent.real), -10.0 * believed, atol=0.5)
 
 
 def test_a_weaker_response_earns_nothing_on_nominal_flights():
     """With q = 1 half the response halves what folded noise leaves; with q as measured it adds to it."""
     rng = np.random.default_rng(2)
     felt, commands = flights(rng, 1.0, 2.0)
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     y, w = (x[0] for x in flights(rng, 1.0, 2.0, 1))
     def table(torque):
         return np.concatenate([np.zeros((*torque.shape[:2], 3)), torque,
@@ -77,7 +90,7 @@ def test_a_weaker_response_earns_nothing_on_nominal_flights():
 def test_means_stay_as_they_are():
     rng = np.random.default_rng(3)
     felt, commands = flights(rng, 1.0, 2.0)
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     spectra = np.zeros((12, BINS, COUNT), complex)
     spectra[:, :, TORQUE] = felt[0] - commands[0]
     out = response.with_torque_gap(spectra, response.quiet(commands[0]), TorqueSpectra(felt[0], commands[0]))
@@ -91,7 +104,7 @@ def test_blocks_in_which_a_set_point_stepped_have_a_law_and_a_weight_of_their_ow
         kick = noise(rng, (5, BINS, 3), 30.0)
         w[::4] += kick
         f[::4] += kick / 3.0 + noise(rng, kick.shape, 3.0)
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     np.testing.assert_array_equal(response.quiet(commands[0])[:, 0], np.arange(20) % 4 != 0)
     np.testing.assert_allclose(np.abs(response.stepped_law.coherent), 1.0 / 3.0, atol=0.05)
     variances = 1.0 - 0.5, 9.0 + 4.0 / 9.0 + 1.0 / 9.0  # of power: of errors in variables; the kick's own scatter
@@ -113,7 +126,7 @@ def test_of_few_quiet_blocks_a_higher_coherence_is_believed(monkeypatch, count):
     rng = np.random.default_rng(9)
     commands = flights(rng, 1.0, 1.0, 1, 40)[1]
     noise = [rng.normal(size=c.shape) + 1j * rng.normal(size=c.shape) for c in commands]
-    clean, of_noise = (response_of(torques(felt, commands), NO_LOOP) for felt in ([0.5 * c for c in commands], noise))
+    clean, of_noise = (response_of(torques(felt, commands), NO_LOOP, NO_NOISE) for felt in ([0.5 * c for c in commands], noise))
     assert (clean is None) == (of_noise is None) == (count < 2)
     if clean is not None:
         assert np.mean(np.abs(of_noise.quiet_law.coherent[FIRST_BIN:, 0])) < 0.08
@@ -129,7 +142,7 @@ def test_flights_that_differ_so_much_that_an_axis_is_never_quiet_have_no_respons
     rng = np.random.default_rng(8)
     long, short = flights(rng, 1.0, 1.0, 1, 40), flights(rng, 1.0, 1.0, 2, 8)
     felt, commands = ([*a, *(strength * x for x in b)] for a, b in zip(long, short, strict=True))
-    response = response_of(torques(felt, commands), NO_LOOP)
+    response = response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
     assert (response is None) == (strength > 1.0)
     if response is not None:
         np.testing.assert_allclose(np.median(np.abs(response.quiet_law.coherent), axis=0), 0.5, atol=0.02)
