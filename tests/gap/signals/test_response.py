@@ -126,7 +126,8 @@ def test_of_few_quiet_blocks_a_higher_coherence_is_believed(monkeypatch, count):
     rng = np.random.default_rng(9)
     commands = flights(rng, 1.0, 1.0, 1, 40)[1]
     noise = [rng.normal(size=c.shape) + 1j * rng.normal(size=c.shape) for c in commands]
-    clean, of_noise = (response_of(torques(felt, commands), NO_LOOP, NO_NOISE) for felt in ([0.5 * c for c in commands], noise))
+    clean, of_noise = (response_of(torques(felt, commands), NO_LOOP, NO_NOISE)
+                       for felt in ([0.5 * c for c in commands], noise))
     assert (clean is None) == (of_noise is None) == (count < 2)
     if clean is not None:
         assert np.mean(np.abs(of_noise.quiet_law.coherent[FIRST_BIN:, 0])) < 0.08

@@ -1,0 +1,79 @@
+"""Flights of RotorPy's Crazyflie: what is drawn, the loop's signs, a hover that a weak rotor must not upset."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airtouch import vehicle as vehicles
+from tools.simulation.rotorpy_loop import labels
+
+TOOL = Path(__file__).parents[3] / "tools/simulation/rotorpy_flights.py"
+
+
+@pytest.fixture(scope="module")
+def rotorpy():
+    """The modules that need RotorPy."""
+    pytest.importorskip("rotorpy", reason="needs the extra 'bench'")
+    from tools.simulation.rotorpy_loop import controller, course, flight, vehicle
+    return controller, course, flight, vehicle
+
+
+def test_every_effect_is_drawn_within_its_range_and_each_flight_has_a_seed_of_its_own():
+    drawn = labels.labels_of(2, 3, 5)
+    assert [x.file for x in drawn[:2]] == ["cal_A_0.csv.gz", "cal_A_1.csv.gz"] and len(drawn) == 2 + 3 + 2 * 17
+    assert len({x.seed for x in drawn}) == len({x.file for x in drawn}) == len(drawn)
+    assert {x.seed for x in drawn}.isdisjoint(x.seed for x in labels.labels_of(2, 3, 6))
+    for name, (low, high, _) in labels.STRENGTHS.items():
+        strengths = [x.of(name) for x in drawn if x.effect == name]
+        assert len(strengths) == 2 and all(low <= s <= high for s in strengths)
+    assert [x.effect for x in drawn].count("none") == 5 and drawn[0].of("mass") == 0.0
+
+
+def test_pwm_is_the_inverse_of_the_thrust_curve(rotorpy, tmp_path):
+    *_, vehicle = rotorpy
+    pwm = np.array([1000.0, 20000.0, 40000.0, 65535.0])
+    np.testing.assert_array_equal(vehicle.pwm_of_thrust(vehicle.thrust_of_pwm(pwm)), pwm)
+    (tmp_path / "v.toml").write_text(vehicle.FILE, encoding="utf-8")
+    np.testing.assert_allclose(vehicles.load(tmp_path / "v.toml").thrust(pwm), vehicle.thrust_of_pwm(pwm), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("moved", "more"), [("z", (1, 1, 1, 1)), ("roll", (1, 1, 0, 0)), ("pitch", (1, 0, 0, 1)),
+                                             ("yaw", (1, 0, 1, 0))])
+def test_the_loop_turns_back(rotorpy, moved, more):
+    """By hand: too low, all rotors go up; rolled right, the right ones; nose down, the front; turned left, 1 and 3."""
+    controller, course, _, vehicle = rotorpy
+    at_rest = controller.Estimate(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
+    hover = vehicle.pwm_of_thrust(np.full(4, 0.25 * vehicle.MASS_KG * vehicle.GRAVITY))
+    wanted = course.Wanted(np.zeros(3), np.zeros(3))
+    np.testing.assert_array_equal(controller.Controller().pwm(wanted, at_rest), hover)
+    away = {"z": at_rest._replace(position=np.array([0.0, 0.0, -0.1])),
+            "roll": at_rest._replace(angles=np.array([0.1, 0.0, 0.0])),
+            "pitch": at_rest._replace(angles=np.array([0.0, 0.1, 0.0])),
+            "yaw": at_rest._replace(angles=np.array([0.0, 0.0, 0.1]))}[moved]
+    np.testing.assert_array_equal(controller.Controller().pwm(wanted, away) > hover, np.array(more, bool))
+
+
+def test_a_weak_rotor_gets_the_thrust_it_lost(rotorpy, monkeypatch):
+    """In hover each motor lifts a quarter of the weight: its thrust by the curve, less the fraction that is lost."""
+    _, course, flight, vehicle = rotorpy
+    monkeypatch.setattr(course, "PASS_AT_S", 99.0)
+    monkeypatch.setattr(course.Course, "total_s", property(lambda self: 5.0, lambda self, value: None), raising=False)
+    log = flight.fly(labels.Label("x", "weak_motor", 0.1, "", 3))
+    still = slice(450, 500)
+    lifted = vehicle.thrust_of_pwm(np.stack([log[f"m{i}_pwm"][still] for i in (1, 2, 3, 4)])).mean(axis=1)
+    quarter = 0.25 * vehicle.MASS_KG * vehicle.GRAVITY
+    np.testing.assert_allclose(np.sort(lifted), quarter * np.array([1.0, 1.0, 1.0, 1.0 / 0.9]), rtol=0.02)
+    assert np.std(log["z_m"][still]) < 0.02 and log["z_m"][still].mean() > 0.15
+    np.testing.assert_allclose(log["acc_z_mps2"][:50].mean(), vehicle.GRAVITY, atol=0.05)
+    np.testing.assert_allclose(log["acc_z_mps2"][still].mean(), vehicle.GRAVITY, atol=0.1)
+
+
+def test_flights_of_other_options_are_not_mixed_in(rotorpy, tmp_path):
+    (tmp_path / "manifest.csv").write_text("file,vehicle,effect,strength,unit\ncase_000.csv.gz,A,mass,0.1,x\n")
+    run = subprocess.run([sys.executable, TOOL, tmp_path, "--each", "0", "--nominal", "1"], capture_output=True,
+                         text=True)
+    assert run.returncode == 2 and "choose another folder" in run.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["manifest.csv"]

@@ -1,0 +1,124 @@
+"""One flight, step by step: what is seen, what is commanded, what the vehicle does, what is logged."""
+
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from airtouch.errors import AirTouchError
+from airtouch.logs.flight_log import FlightLog
+
+from .controller import STEP_S, Controller, Estimate
+from .course import Course
+from .labels import Label
+from .vehicle import ACC_NOISE, GRAVITY, GYRO_NOISE, ORDER, RANGE_NOISE, Craft, craft_of, thrust_of_pwm
+
+ROWS = 5  #: steps a row of the log: 100 Hz
+#: correlation time, s, and rms, m and m/s, of what position and velocity err slowly; rms of what they err fast. Chosen
+DRIFT_S, DRIFT, FAST = np.array([[1.0], [0.3]]), np.array([[0.004], [0.02]]), (0.001, 0.006)
+#: correlation time of a gust, s, and its share along each axis: first-order noise, as Dryden's along the flow. Chosen
+GUST_S, GUST_SHARE = 1.0, np.array([1.0, 1.0, 0.5])
+BIAS = 0.25, 0.03  #: of the accelerometer, m/s^2, and the gyro, rad/s, at strength 1
+GYRO_OVER_ACC = 0.05  #: of a vibration, rad/s over m/s^2
+STANDING_M, ROTORS_M = 0.012, 0.02  #: range at rest, and height of the rotors over the vehicle's lowest point
+#: gym-pybullet-drones' formula of ground effect: coefficient, rotor radius and least height, m
+GROUND, RADIUS_M, LEAST_M = 11.37, 0.0231348, 0.02
+MOST_TILT_RAD = 1.0  #: beyond which a flight has failed
+COLUMNS = (*(f"acc_{a}_mps2" for a in "xyz"), *(f"gyro_{a}_radps" for a in "xyz"), *(f"m{i}_pwm" for i in (1, 2, 3, 4)),
+           "zrange_m", *(f"v{a}_mps" for a in "xyz"), *(f"{a}_m" for a in "xyz"))
+State = dict[str, np.ndarray]  #: RotorPy's: x, v, q (w last), w, wind, rotor_speeds
+
+
+class Sensors:
+    """IMU, range and state estimate with their errors; `tone` is a vibration at the speed of one rotor."""
+
+    def __init__(self, label: Label, rng: np.random.Generator) -> None:
+        self.rng, self.noise, self.amplitude = rng, label.of("imu_noise") or 1.0, label.of("vibration")
+        self.biases = [k * label.of("imu_bias") * _direction(rng) for k in BIAS]
+        self.turned_rad, self.tone, self.drift = rng.uniform(0.0, 2.0 * np.pi), 0.0, np.zeros((2, 3))
+
+    def estimate(self, state: State, angles: np.ndarray, resting: bool) -> Estimate:
+        """What the loop sees of a state, a step after the last."""
+        rng, fade = self.rng, STEP_S / DRIFT_S
+        self.turned_rad += STEP_S * state["rotor_speeds"][0]
+        self.tone = 0.0 if resting else self.amplitude * float(np.sin(self.turned_rad))
+        rates = state["w"] + self.noise * rng.normal(0.0, GYRO_NOISE, 3) + self.biases[1] + GYRO_OVER_ACC * self.tone
+        self.drift += np.sqrt(2.0 * fade) * DRIFT * rng.standard_normal((2, 3)) - fade * self.drift
+        position, velocity = (state[k] + slow + rng.normal(0.0, fast, 3)
+                              for k, slow, fast in zip("xv", self.drift, FAST, strict=True))
+        return Estimate(position, velocity, angles, rates)
+
+    def row(self, specific_force: np.ndarray, range_m: float, seen: Estimate, pwm: np.ndarray) -> np.ndarray:
+        """A row of the log, in the order of COLUMNS."""
+        acc = specific_force + self.noise * self.rng.normal(0.0, ACC_NOISE, 3) + self.biases[0] + self.tone
+        measured_m = np.round(range_m + STANDING_M + self.rng.normal(0.0, RANGE_NOISE), 3)
+        return np.r_[acc, seen.rates, pwm, measured_m, seen.velocity, seen.position + (0.0, 0.0, STANDING_M)]
+
+
+def fly(label: Label) -> FlightLog:
+    """The log of a flight. Raises AirTouchError where it falls."""
+    rng = np.random.default_rng(label.seed)
+    course, controller = Course(rng), Controller()
+    heading = rng.uniform(0.0, 2.0 * np.pi)
+    craft = craft_of(label, np.array([np.cos(heading), np.sin(heading), 0.0]))
+    lasting = np.full(4, 1.0 - label.of("thrust_coeff"))
+    lasting[rng.integers(4)] -= label.of("weak_motor")
+    sensors, state = Sensors(label, rng), craft.initial_state
+    late, old = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))
+    commands, seen, rows, resting = [np.zeros(4)] * (late + 1), [], [], True
+    for step in range(round(course.total_s / STEP_S)):
+        t, rotation = step * STEP_S, Rotation.from_quat(state["q"])
+        yaw, pitch, roll = rotation.as_euler("ZYX")
+        seen = [*seen, sensors.estimate(state, np.array([roll, pitch, yaw]), resting)][-old - 1:]
+        pwm = controller.pwm(course.at(t), seen[0]) if course.motors_run(t) else np.zeros(4)
+        commands = [*commands, pwm][-late - 1:]
+        if step % ROWS == 0:
+            down_m = (state["x"][2] - course.surface(state["x"][0])) / max(np.cos(roll) * np.cos(pitch), 0.5)
+            rows.append(sensors.row(_specific_force(craft, state, rotation, resting), down_m, seen[-1], pwm))
+        sag = label.of("battery_sag") * t / course.total_s
+        craft.factor = lasting * (1.0 - sag) * (1.0 + label.of("ground_effect") * _lift(craft, state, rotation, course))
+        if gust := label.of("gust"):
+            fade = STEP_S / GUST_S
+            state["wind"] = (1.0 - fade) * state["wind"] + np.sqrt(2.0 * fade) * gust * GUST_SHARE \
+                * rng.standard_normal(3)
+        state = craft.step(state, {"cmd_motor_speeds": _speeds(craft, commands[0])}, STEP_S)
+        resting = state["x"][2] <= 0.0  # RotorPy's own ground holds a vehicle that climbs slower than 0.5 m/s
+        if resting:
+            state |= {"x": state["x"] * (1.0, 1.0, 0.0), "v": np.zeros(3), "w": np.zeros(3),
+                      "q": Rotation.from_euler("Z", yaw).as_quat()}
+        if not max(abs(roll), abs(pitch)) < MOST_TILT_RAD:
+            raise AirTouchError(f"{label.file}: falls at {t:.1f} s ({label.effect} {label.strength:.3g})")
+    return _log(np.array(rows), label, rng)
+
+
+def _log(table: np.ndarray, label: Label, rng: np.random.Generator) -> FlightLog:
+    """The log of a table (rows, columns), with the times as they were logged."""
+    late = 0.001 * label.of("time_jitter") * rng.standard_normal(len(table))
+    times = np.maximum.accumulate(ROWS * STEP_S * np.arange(len(table)) + late - min(late[0], 0.0))
+    return FlightLog({"t_s": times, **{name: table[:, i] for i, name in enumerate(COLUMNS)}})
+
+
+def _speeds(craft: Craft, pwm: np.ndarray) -> np.ndarray:
+    """Speeds (4,), rad/s, in RotorPy's order, that a motor goes to at a PWM (4,)."""
+    speeds = np.empty(4)
+    speeds[ORDER] = np.sqrt(thrust_of_pwm(pwm) / craft.k_eta)
+    return speeds
+
+
+def _specific_force(craft: Craft, state: State, rotation: Any, resting: bool) -> np.ndarray:
+    """What an accelerometer reads (3,), m/s^2, in the body's axes."""
+    change = craft.statedot(state, {"cmd_motor_speeds": state["rotor_speeds"]}, STEP_S)["vdot"]
+    return rotation.inv().apply((0.0 if resting else change) + np.array([0.0, 0.0, GRAVITY]))
+
+
+def _lift(craft: Craft, state: State, rotation: Any, course: Course) -> np.ndarray:
+    """Share (4,) of its thrust that each rotor gains by what lies below it, in RotorPy's order."""
+    places = state["x"] + rotation.apply(craft.rotor_geometry)
+    height = places[:, 2] + ROTORS_M - np.array([course.surface(x) for x in places[:, 0]])
+    return GROUND * (RADIUS_M / (4.0 * np.maximum(height, LEAST_M))) ** 2
+
+
+def _direction(rng: np.random.Generator) -> np.ndarray:
+    """A direction (3,) drawn evenly."""
+    v = rng.standard_normal(3)
+    return v / np.linalg.norm(v)
