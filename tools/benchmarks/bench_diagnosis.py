@@ -22,6 +22,9 @@ from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.gap.nominal.kept_scatter import VARIABLE
 
+#: environment in which Python keeps what it compiles of its modules, as it does where nothing forbids it
+KEEPS_BYTECODE = {"PYTHONDONTWRITEBYTECODE": ""}
+
 
 def seconds(processors: set[int], out: Path, cache: str) -> float:
     """Wall time of one diagnosis on some processors; cache: folder of the baselines' scatters, empty for none."""
@@ -31,7 +34,7 @@ def seconds(processors: set[int], out: Path, cache: str) -> float:
                "--baseline", *baseline, "--json", str(out / "it.json"),
                "--report", str(out / "it.html"), "--force"]
     start = time.perf_counter()
-    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, VARIABLE: cache},
+    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, VARIABLE: cache, **KEEPS_BYTECODE},
                          preexec_fn=lambda: os.sched_setaffinity(0, processors))
     if run.returncode:
         raise AirTouchError(f"the diagnosis failed: {(run.stderr.strip().splitlines() or ['without a message'])[-1]}")
