@@ -91,6 +91,7 @@ REFUSED = [
     ("simulation/gap_scenes.py", "--jobs 0", LESS),
     ("simulation/rotorpy_flights.py", "full/file", "cannot be made"),
     ("simulation/rotorpy_flights.py", "new --nominal -1", "whole number from 0"),
+    ("simulation/rotorpy_flights.py", "new --slow-error nan", "no number from 0 on"),
     ("simulation/simulated_training.py", "", "empty"),
     ("simulation/simulated_training.py", "--without no-such", "no-such"),
     ("simulation/simulated_training.py", "--steps 0", LESS),

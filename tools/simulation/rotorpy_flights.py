@@ -12,6 +12,7 @@ run goes on; a set of other options needs another OUT. Needs the extra `bench`. 
 import argparse
 import csv
 import io
+import math
 import os
 import sys
 from concurrent.futures import ProcessPoolExecutor
@@ -35,50 +36,62 @@ def main() -> None:
     parser.add_argument("--each", type=whole_number(0), default=3, help="flights an effect (default %(default)s)")
     parser.add_argument("--nominal", type=whole_number(0), default=12, help="without an effect (default %(default)s)")
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of all that is drawn (default %(default)s)")
+    parser.add_argument("--slow-error", type=factor, default=1.0, metavar="FACTOR",
+                        help="on the slow error of position and velocity, 4 mm and 2 cm/s rms (default %(default)s)")
     options = parser.parse_args()
     labels = labels_of(options.each, options.nominal, options.seed)
-    check(options.out, labels)
+    check(options.out, manifest(labels, options.slow_error))
     make_folder(options.out)
-    write_bytes(manifest(labels), options.out / MANIFEST, force=True)
+    write_bytes(manifest(labels, options.slow_error), options.out / MANIFEST, force=True)
     from rotorpy_loop import vehicle
 
     write_bytes(vehicle.FILE.encode(), options.out / "vehicle_a.toml", force=True)
     with ProcessPoolExecutor() as pool:
-        running = [pool.submit(make, options.out, label) for label in labels]
+        running = [pool.submit(make, options.out, label, options.slow_error) for label in labels]
         failed = [text for flight in with_bar(running, "flying") if (text := flight.result())]
     if failed:
         print("\n".join(failed), file=sys.stderr)
         flown = [x for x in labels if (options.out / x.file).exists()]
-        write_bytes(manifest(flown), options.out / MANIFEST, force=True)
+        write_bytes(manifest(flown, options.slow_error), options.out / MANIFEST, force=True)
 
 
-def check(out: Path, labels: list[Label]) -> None:
-    """Raise AirTouchError where RotorPy is not installed, or OUT holds other flights."""
+def factor(text: str) -> float:
+    """A finite number from 0 on, for argparse. Raises ArgumentTypeError for any other text."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is no number from 0 on")
+    return number
+
+
+def check(out: Path, text: bytes) -> None:
+    """Raise AirTouchError where RotorPy is not installed, or OUT has flights that are not in a manifest's text."""
     try:
         import rotorpy  # noqa: F401
     except ModuleNotFoundError:
         raise AirTouchError("RotorPy is not installed: pip install rotorpy==3.0.0, or `make setup`") from None
-    if (out / MANIFEST).exists() and not set((out / MANIFEST).read_bytes().splitlines()) <= \
-            set(manifest(labels).splitlines()):
+    if (out / MANIFEST).exists() and not set((out / MANIFEST).read_bytes().splitlines()) <= set(text.splitlines()):
         raise AirTouchError(f"{out / MANIFEST}: flights of other options are there; choose another folder")
 
 
-def manifest(labels: list[Label]) -> bytes:
+def manifest(labels: list[Label], slow_error: float) -> bytes:
     """The text of a manifest: a row for each flight."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(("file", "vehicle", "effect", "strength", "unit"))
-    table.writerows((x.file, "A", x.effect, f"{x.strength:.5g}", x.unit) for x in labels)
+    table.writerow(("file", "vehicle", "effect", "strength", "unit", "slow_error"))
+    table.writerows((x.file, "A", x.effect, f"{x.strength:.5g}", x.unit, f"{slow_error:g}") for x in labels)
     return text.getvalue().encode()
 
 
-def make(out: Path, label: Label) -> str:
+def make(out: Path, label: Label, slow_error: float) -> str:
     """Make one flight where it is not there yet; what went wrong, or ""."""
     from rotorpy_loop.flight import fly
 
     try:
         if not (out / label.file).exists():
-            write(fly(label), out / label.file)
+            write(fly(label, slow_error), out / label.file)
     except AirTouchError as error:
         return str(error)
     return ""

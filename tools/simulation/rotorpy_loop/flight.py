@@ -32,7 +32,8 @@ State = dict[str, np.ndarray]  #: RotorPy's: x, v, q (w last), w, wind, rotor_sp
 class Sensors:
     """IMU, range and state estimate with their errors; `tone` is a vibration at the speed of one rotor."""
 
-    def __init__(self, label: Label, rng: np.random.Generator) -> None:
+    def __init__(self, label: Label, slow_error: float, rng: np.random.Generator) -> None:
+        self.slow_rms = slow_error * DRIFT
         self.rng, self.noise, self.amplitude = rng, label.of("imu_noise") or 1.0, label.of("vibration")
         self.biases = [k * label.of("imu_bias") * _direction(rng) for k in BIAS]
         self.turned_rad, self.tone, self.drift = rng.uniform(0.0, 2.0 * np.pi), 0.0, np.zeros((2, 3))
@@ -43,7 +44,7 @@ class Sensors:
         self.turned_rad += STEP_S * state["rotor_speeds"][0]
         self.tone = 0.0 if resting else self.amplitude * float(np.sin(self.turned_rad))
         rates = state["w"] + self.noise * rng.normal(0.0, GYRO_NOISE, 3) + self.biases[1] + GYRO_OVER_ACC * self.tone
-        self.drift += np.sqrt(2.0 * fade) * DRIFT * rng.standard_normal((2, 3)) - fade * self.drift
+        self.drift += np.sqrt(2.0 * fade) * self.slow_rms * rng.standard_normal((2, 3)) - fade * self.drift
         position, velocity = (state[k] + slow + rng.normal(0.0, fast, 3)
                               for k, slow, fast in zip("xv", self.drift, FAST, strict=True))
         return Estimate(position, velocity, angles, rates)
@@ -55,15 +56,15 @@ class Sensors:
         return np.r_[acc, seen.rates, pwm, measured_m, seen.velocity, seen.position + (0.0, 0.0, STANDING_M)]
 
 
-def fly(label: Label) -> FlightLog:
-    """The log of a flight. Raises AirTouchError where it falls."""
+def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
+    """The log of a flight; slow_error: factor on DRIFT. Raises AirTouchError where the vehicle falls."""
     rng = np.random.default_rng(label.seed)
     course, controller = Course(rng), Controller()
     heading = rng.uniform(0.0, 2.0 * np.pi)
     craft = craft_of(label, np.array([np.cos(heading), np.sin(heading), 0.0]))
     lasting = np.full(4, 1.0 - label.of("thrust_coeff"))
     lasting[rng.integers(4)] -= label.of("weak_motor")
-    sensors, state = Sensors(label, rng), craft.initial_state
+    sensors, state = Sensors(label, slow_error, rng), craft.initial_state
     late, old = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))
     commands, seen, rows, resting = [np.zeros(4)] * (late + 1), [], [], True
     for step in range(round(course.total_s / STEP_S)):
