@@ -3,10 +3,12 @@
     python tools/simulation/rotorpy_flights.py OUT [--each 3] [--nominal 12] [--seed 0]    # 10 s of one core a flight
     python tools/diagnosis/gap_peers.py OUT
 
-Each flight takes off, hovers, passes over a platform, hovers and lands, with one effect or none. Body, motor lag and
-drag are RotorPy's, the rest is added (tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate
+Each flight takes off, hovers, passes over a platform, hovers and sinks, with one effect or none; its motors stop a few
+centimetres above the ground. Body and the laws of motor lag and drag are RotorPy's, the rest is added
+(tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate
 on, the flights and a manifest.csv of the effect in each. Flights that are there already are kept, so that a stopped
-run goes on; a set of other options needs another OUT. Needs the extra `bench`. host/docs/gap-real.md has the figures.
+run goes on; a set of other options needs another OUT. A flight in which the vehicle falls is left out of the manifest,
+with an error at the end. Needs the extra `bench`. host/docs/gap-real.md has the figures.
 """
 
 import argparse
@@ -14,7 +16,6 @@ import csv
 import io
 import math
 import os
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -48,11 +49,15 @@ def main() -> None:
     write_bytes(vehicle.FILE.encode(), options.out / "vehicle_a.toml", force=True)
     with ProcessPoolExecutor() as pool:
         running = [pool.submit(make, options.out, label, options.slow_error) for label in labels]
-        failed = [text for flight in with_bar(running, "flying") if (text := flight.result())]
+        try:
+            failed = [text for flight in with_bar(running, "flying") if (text := flight.result())]
+        except BaseException:  # a stop by the keyboard too: else every flight that waits would be flown first
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     if failed:
-        print("\n".join(failed), file=sys.stderr)
         flown = [x for x in labels if (options.out / x.file).exists()]
         write_bytes(manifest(flown, options.slow_error), options.out / MANIFEST, force=True)
+        raise AirTouchError(f"{len(failed)} of {len(labels)} flights failed and are not in {MANIFEST}: {failed[0]}")
 
 
 def factor(text: str) -> float:
@@ -80,8 +85,8 @@ def manifest(labels: list[Label], slow_error: float) -> bytes:
     """The text of a manifest: a row for each flight."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    table.writerow(("file", "vehicle", "effect", "strength", "unit", "slow_error"))
-    table.writerows((x.file, "A", x.effect, f"{x.strength:.5g}", x.unit, f"{slow_error:g}") for x in labels)
+    table.writerow(("file", "vehicle", "effect", "strength", "unit", "seed", "slow_error"))
+    table.writerows((x.file, "A", x.effect, f"{x.strength:.5g}", x.unit, x.seed, f"{slow_error:g}") for x in labels)
     return text.getvalue().encode()
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from airtouch import vehicle as vehicles
+from airtouch.errors import AirTouchError
 from tools.simulation.rotorpy_loop import labels
 
 TOOL = Path(__file__).parents[3] / "tools/simulation/rotorpy_flights.py"
@@ -71,9 +72,17 @@ def test_a_weak_rotor_gets_the_thrust_it_lost(rotorpy, monkeypatch):
     np.testing.assert_allclose(log["acc_z_mps2"][still].mean(), vehicle.GRAVITY, atol=0.1)
 
 
-def test_flights_of_other_options_are_not_mixed_in(rotorpy, tmp_path):
-    (tmp_path / "manifest.csv").write_text("file,vehicle,effect,strength,unit\ncase_000.csv.gz,A,mass,0.1,x\n")
-    run = subprocess.run([sys.executable, TOOL, tmp_path, "--each", "0", "--nominal", "1"], capture_output=True,
-                         text=True)
+@pytest.mark.parametrize("options", [("--seed", "1"), ("--slow-error", "0")])
+def test_flights_of_other_options_are_not_mixed_in(rotorpy, tmp_path, options):
+    """Those without an effect look alike in the manifest, but for the seed and what they err by."""
+    from tools.simulation.rotorpy_flights import MANIFEST, manifest
+    (tmp_path / MANIFEST).write_bytes(manifest(labels.labels_of(0, 1, 0), 1.0))
+    run = subprocess.run([sys.executable, TOOL, tmp_path, "--each", "0", "--nominal", "1", *options],
+                         capture_output=True, text=True)
     assert run.returncode == 2 and "choose another folder" in run.stderr
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["manifest.csv"]
+    assert [p.name for p in tmp_path.iterdir()] == [MANIFEST]
+
+
+def test_more_flights_than_seeds_are_refused():
+    with pytest.raises(AirTouchError, match="900"):
+        labels.labels_of(0, 901, 0)

@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from .course import Wanted
+from .labels import STEP_S
 from .vehicle import ARM_M, GRAVITY, INERTIA, MASS_KG, YAW_ARM_M, pwm_of_thrust
 
-STEP_S = 0.002  #: of the loop
-PLACE_GAIN, MOST_MPS = 2.0, 0.6  #: 1/s, and the most that it asks for
-SPEED_GAIN, SPEED_INTEGRAL, MOST_SUM_M = np.array([3.0, 3.0, 6.0]), np.array([0.8, 0.8, 4.0]), 0.6  #: 1/s, 1/s^2, m
+POSITION_GAIN, MOST_MPS = 2.0, 0.6  #: 1/s, and the most that it asks for
+VELOCITY_GAIN, VELOCITY_INTEGRAL = np.array([3.0, 3.0, 6.0]), np.array([0.8, 0.8, 4.0])  #: 1/s, 1/s^2
+MOST_SUM_M = 0.6  #: of the velocity's integral
 MOST_TILT_RAD = 0.35
 ANGLE_GAIN = 7.0  #: 1/s
 RATE_GAIN, RATE_INTEGRAL, MOST_SUM_RAD = np.array([28.0, 28.0, 12.0]), 25.0, 0.5  #: 1/s, 1/s^2, rad
@@ -28,14 +29,14 @@ class Controller:
     """The loop of the nominal vehicle; its integrals are its state."""
 
     def __init__(self) -> None:
-        self.sum_speed, self.sum_rate = np.zeros(3), np.zeros(3)
+        self.sum_velocity, self.sum_rate = np.zeros(3), np.zeros(3)
 
     def pwm(self, wanted: Wanted, seen: Estimate) -> np.ndarray:
         """PWM (4,) for what is wanted and seen."""
-        asked = np.clip(PLACE_GAIN * (wanted.position - seen.position), -MOST_MPS, MOST_MPS)
+        asked = np.clip(POSITION_GAIN * (wanted.position - seen.position), -MOST_MPS, MOST_MPS)
         error = asked + wanted.velocity - seen.velocity
-        self.sum_speed = np.clip(self.sum_speed + error * STEP_S, -MOST_SUM_M, MOST_SUM_M)
-        acceleration = SPEED_GAIN * error + SPEED_INTEGRAL * self.sum_speed
+        self.sum_velocity = np.clip(self.sum_velocity + error * STEP_S, -MOST_SUM_M, MOST_SUM_M)
+        acceleration = VELOCITY_GAIN * error + VELOCITY_INTEGRAL * self.sum_velocity
         pitch, roll = np.clip(np.array([acceleration[0], -acceleration[1]]) / GRAVITY, -MOST_TILT_RAD, MOST_TILT_RAD)
         upright = max(np.cos(seen.angles[0]) * np.cos(seen.angles[1]), 0.6)
         thrust = MASS_KG * np.clip(GRAVITY + acceleration[2], 2.0, 16.0) / upright

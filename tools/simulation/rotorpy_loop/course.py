@@ -1,4 +1,4 @@
-"""A drawn mission: take off, hover, pass over a platform, hover, land."""
+"""A drawn mission: take off, hover, pass over a platform, hover, sink."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 SPEED_MPS = 0.35
 RISE_AT_S, RISE_S, PASS_AT_S, LANDING_S = 1.6, 1.2, 6.5, 2.0
-MOTORS_ON_S, MOTORS_OFF_S = RISE_AT_S - 0.8, LANDING_S - 0.1  #: the latter after the landing begins
+MOTORS_ON_S, MOTORS_OFF_S = RISE_AT_S - 0.8, LANDING_S - 0.1  #: the latter after the descent begins, before its end
 BEGIN_M = 0.8  #: where the platform begins
 
 

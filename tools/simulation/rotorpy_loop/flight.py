@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from airtouch.errors import AirTouchError
 from airtouch.logs.flight_log import FlightLog
 
-from .controller import STEP_S, Controller, Estimate
+from .controller import Controller, Estimate
 from .course import Course
-from .labels import Label
+from .labels import STEP_S, Label
 from .vehicle import ACC_NOISE, GRAVITY, GYRO_NOISE, ORDER, RANGE_NOISE, Craft, craft_of, thrust_of_pwm
 
 ROWS = 5  #: steps a row of the log: 100 Hz
@@ -19,18 +19,21 @@ DRIFT_S, DRIFT, FAST = np.array([[1.0], [0.3]]), np.array([[0.004], [0.02]]), (0
 #: correlation time of a gust, s, and its share along each axis: first-order noise, as Dryden's along the flow. Chosen
 GUST_S, GUST_SHARE = 1.0, np.array([1.0, 1.0, 0.5])
 BIAS = 0.25, 0.03  #: of the accelerometer, m/s^2, and the gyro, rad/s, at strength 1
-GYRO_OVER_ACC = 0.05  #: of a vibration, rad/s over m/s^2
+GYRO_OVER_ACC = 0.05  #: of a vibration, rad/s over m/s^2; chosen, as in FLIGHTS/peers
 STANDING_M, ROTORS_M = 0.012, 0.02  #: range at rest, and height of the rotors over the vehicle's lowest point
-#: gym-pybullet-drones' formula of ground effect: coefficient, rotor radius and least height, m
+#: gym-pybullet-drones' formula of ground effect: coefficient and rotor radius, m; least height, m, chosen
 GROUND, RADIUS_M, LEAST_M = 11.37, 0.0231348, 0.02
-MOST_TILT_RAD = 1.0  #: beyond which a flight has failed
+FALLEN_TILT_RAD = 1.0  #: beyond which a flight has failed
 COLUMNS = (*(f"acc_{a}_mps2" for a in "xyz"), *(f"gyro_{a}_radps" for a in "xyz"), *(f"m{i}_pwm" for i in (1, 2, 3, 4)),
            "zrange_m", *(f"v{a}_mps" for a in "xyz"), *(f"{a}_m" for a in "xyz"))
 State = dict[str, np.ndarray]  #: RotorPy's: x, v, q (w last), w, wind, rotor_speeds
 
 
 class Sensors:
-    """IMU, range and state estimate with their errors; `tone` is a vibration at the speed of one rotor."""
+    """IMU, range, position and velocity with their errors; the attitude is known exactly.
+
+    tone: vibration at the speed of one rotor, m/s^2, the same on each axis.
+    """
 
     def __init__(self, label: Label, slow_error: float, rng: np.random.Generator) -> None:
         self.slow_rms = slow_error * DRIFT
@@ -87,7 +90,7 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
         if resting:
             state |= {"x": state["x"] * (1.0, 1.0, 0.0), "v": np.zeros(3), "w": np.zeros(3),
                       "q": Rotation.from_euler("Z", yaw).as_quat()}
-        if not max(abs(roll), abs(pitch)) < MOST_TILT_RAD:
+        if not max(abs(roll), abs(pitch)) < FALLEN_TILT_RAD:
             raise AirTouchError(f"{label.file}: falls at {t:.1f} s ({label.effect} {label.strength:.3g})")
     return _log(np.array(rows), label, rng)
 

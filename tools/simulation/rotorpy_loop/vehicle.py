@@ -12,10 +12,10 @@ MASS_KG, INERTIA = quad_params["mass"], tuple(quad_params[f"I{a}{a}"] for a in "
 ARM_M = float(np.linalg.norm(quad_params["rotor_pos"]["r1"]))
 YAW_ARM_M = quad_params["k_m"] / quad_params["k_eta"]
 GRAVITY = 9.81
-LAG_S = 0.03
-C0, C1, C2 = 5.484560e-4, 1.032633e-6, 2.130295e-11  #: thrust of a motor, N: c0 + c1 p + c2 p^2 of PWM p
+LAG_S = 0.03  #: chosen; RotorPy's is 0.072
+C0, C1, C2 = 5.484560e-4, 1.032633e-6, 2.130295e-11  #: thrust of a motor, N: c0 + c1 p + c2 p^2 of PWM p; chosen
 ACC_NOISE, GYRO_NOISE, RANGE_NOISE = 0.06, 0.006, 0.002  #: rms: m/s^2, rad/s, m
-FILE = f"""# RotorPy 3.0's Crazyflie, as declared
+FILE = f"""# Body of RotorPy 3.0's Crazyflie; motor lag, thrust curve, rotor radius and noise chosen, no drag
 name = "rotorpy"
 mass_kg = {MASS_KG}
 arm_m = {ARM_M:.6g}
@@ -44,8 +44,12 @@ class Craft(Multirotor):
         return super().compute_body_wrench(body_rates, rotor_speeds * np.sqrt(self.factor), body_airspeed_vector)
 
 
-def craft_of(label: Label, across: np.ndarray) -> Craft:
-    """The vehicle of a flight, at rest on the ground; across (3,): a drawn direction, of wind and of an offset."""
+def craft_of(label: Label, direction: np.ndarray) -> Craft:
+    """The vehicle of a flight, at rest on the ground.
+
+    direction (3,): horizontal unit vector, of the wind or of the centre of mass' offset. In a wind the vehicle has
+    RotorPy's drag, else none but that of `rotor_drag`.
+    """
     p: dict[str, Any] = {**quad_params, "tau_m": LAG_S * (label.of("motor_lag") or 1.0)}
     p["mass"] *= 1.0 + label.of("mass")
     for axis in "xyz":
@@ -53,9 +57,9 @@ def craft_of(label: Label, across: np.ndarray) -> Craft:
     in_wind = bool(label.of("wind") or label.of("gust"))
     drag = label.of("rotor_drag") or float(in_wind)  # none in the nominal vehicle
     p["k_d"], p["k_z"] = drag * p["k_d"], drag * p["k_z"]
-    p["rotor_pos"] = {k: r - 0.001 * label.of("com_offset") * across for k, r in p["rotor_pos"].items()}
+    p["rotor_pos"] = {k: r - 0.001 * label.of("com_offset") * direction for k, r in p["rotor_pos"].items()}
     state = {"x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3),
-             "wind": label.of("wind") * across, "rotor_speeds": np.zeros(4)}
+             "wind": label.of("wind") * direction, "rotor_speeds": np.zeros(4)}
     return Craft(p, state, integrator_kwargs={"method": "RK23", "rtol": 1e-4, "atol": 1e-7})
 
 

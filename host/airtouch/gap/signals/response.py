@@ -17,7 +17,8 @@ dilution: Fuller, Measurement Error Models, 1987, chapter 1).
 
 The controllers answer the gyro's noise too, so that y and w share it. Where it makes a fraction rho of the power of y,
 the coherence that it makes is rho at most. So q is believed from `noise` on: the largest of rho, NOISE and one over
-the number of blocks. In yaw, where a small torque takes large commands, y above 2 Hz may be hardly more.
+the number of blocks. In yaw, where a small torque takes large commands, y above 2 Hz may be hardly
+more than this noise: then q is not believed.
 
 Taken as q = 1, every hypothesis that weakens the response (more inertia, slower motors) would fit. What effects add
 comes through the commands, of which a part q~ is seen too, or as a torque from outside, which acts past the loop that
@@ -47,8 +48,8 @@ FEWEST_QUIET = 2  #: quiet blocks that each axis needs: the coherence of a singl
 #: relative error of the loop model in that change of the transfer function which the command's limits make: that in
 #: simulated flights with attitude gains of 0.5, 1.4 and 2, ten flights each
 CUT_DOUBT = 0.3
-#: coherence, at least, up to which q is taken for the gyro's noise in both y and w, and not believed; from twice this
-#: on it is believed in full; chosen, not measured. With a larger one more bins lose their q~, and the torque there says
+#: least coherence from which q is believed, and from twice this in full; below it the gyro's noise in both y and w may
+#: make q; chosen, not measured. With a larger one more bins lose their q~, and the torque there says
 #: less of effects that act through the commands; with a smaller one noise that the vehicle's file does not declare
 #: counts as a response
 NOISE = 0.2
