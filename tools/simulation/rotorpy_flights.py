@@ -15,13 +15,14 @@ import argparse
 import csv
 import io
 import math
+import multiprocessing
 import os
-from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from airtouch.cli.shared.arguments import whole_number
-from airtouch.cli.shared.progress import with_bar
+from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs import write
 from airtouch.logs.files import make_folder, write_bytes
@@ -41,19 +42,20 @@ def main() -> None:
                         help="on the slow error of position and velocity, 4 mm and 2 cm/s rms (default %(default)s)")
     options = parser.parse_args()
     labels = labels_of(options.each, options.nominal, options.seed)
-    check(options.out, manifest(labels, options.slow_error))
+    text = manifest(labels, options.slow_error)
+    check(options.out, text)
     make_folder(options.out)
-    write_bytes(manifest(labels, options.slow_error), options.out / MANIFEST, force=True)
+    write_bytes(text, options.out / MANIFEST, force=True)
     from rotorpy_loop import vehicle
 
     write_bytes(vehicle.FILE.encode(), options.out / "vehicle_a.toml", force=True)
-    with ProcessPoolExecutor() as pool:
-        running = [pool.submit(make, options.out, label, options.slow_error) for label in labels]
-        try:
-            failed = [text for flight in with_bar(running, "flying") if (text := flight.result())]
-        except BaseException:  # a stop by the keyboard too: else every flight that waits would be flown first
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    fly_one = partial(make, options.out, options.slow_error)
+    with multiprocessing.Pool() as pool, Bar("flying") as bar:  # ends its workers at once when it is stopped
+        reasons = []
+        for reason in pool.imap(fly_one, labels):
+            reasons.append(reason)
+            bar(len(reasons), len(labels))
+    failed = [reason for reason in reasons if reason]
     if failed:
         flown = [x for x in labels if (options.out / x.file).exists()]
         write_bytes(manifest(flown, options.slow_error), options.out / MANIFEST, force=True)
@@ -90,7 +92,7 @@ def manifest(labels: list[Label], slow_error: float) -> bytes:
     return text.getvalue().encode()
 
 
-def make(out: Path, label: Label, slow_error: float) -> str:
+def make(out: Path, slow_error: float, label: Label) -> str:
     """Make one flight where it is not there yet; what went wrong, or ""."""
     from rotorpy_loop.flight import fly
 

@@ -65,10 +65,10 @@ def test_the_diagnosis_says_when(study):
     assert [e.name for e in diagnosis.effects] == ["downwash"]
     seconds = diagnosis.effects[0].seconds
     t, near = np.arange(len(one)) * flight.PERIOD_S, np.abs(one.log["x_m"] - wake["x"]) < wake["width"]
-    told = np.any([(t >= start) & (t < end) for _, start, end in seconds], axis=0)
+    inside_gate = np.any([(t >= start) & (t < end) for _, start, end in seconds], axis=0)
     assert len(seconds) == 2 and all(name == one.name for name, _, _ in seconds)
-    assert (told & near).sum() > 0.7 * near.sum()
-    assert (told & ~near).sum() * flight.PERIOD_S < 3.0  # blocks last 2.56 s
+    assert (inside_gate & near).sum() > 0.7 * near.sum()
+    assert (inside_gate & ~near).sum() * flight.PERIOD_S < 3.0  # blocks last 2.56 s
     fields = next(e for e in diagnosis.plain()["effects"] if "seconds" in e)
     first = fields["seconds"][0]
     assert (first["from_s"], first["to_s"]) == pytest.approx(seconds[0][1:], abs=0.01)

@@ -36,9 +36,10 @@ def test_every_effect_is_drawn_within_its_range_and_each_flight_has_a_seed_of_it
 def test_pwm_is_the_inverse_of_the_thrust_curve(rotorpy, tmp_path):
     *_, vehicle = rotorpy
     pwm = np.array([1000.0, 20000.0, 40000.0, 65535.0])
-    np.testing.assert_array_equal(vehicle.pwm_of_thrust(vehicle.thrust_of_pwm(pwm)), pwm)
+    np.testing.assert_array_equal(vehicle.pwm_of_thrust(vehicle.DECLARED.thrust(pwm)), pwm)
     (tmp_path / "v.toml").write_text(vehicle.FILE, encoding="utf-8")
-    np.testing.assert_allclose(vehicles.load(tmp_path / "v.toml").thrust(pwm), vehicle.thrust_of_pwm(pwm), rtol=1e-6)
+    by_hand = vehicle.C0 + vehicle.C1 * pwm + vehicle.C2 * pwm ** 2
+    np.testing.assert_allclose(vehicles.load(tmp_path / "v.toml").thrust(pwm), by_hand, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("moved", "more"), [("z", (1, 1, 1, 1)), ("roll", (1, 1, 0, 0)), ("pitch", (1, 0, 0, 1)),
@@ -48,13 +49,13 @@ def test_the_loop_turns_back(rotorpy, moved, more):
     controller, course, _, vehicle = rotorpy
     at_rest = controller.Estimate(np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
     hover = vehicle.pwm_of_thrust(np.full(4, 0.25 * vehicle.MASS_KG * vehicle.GRAVITY))
-    wanted = course.Wanted(np.zeros(3), np.zeros(3))
-    np.testing.assert_array_equal(controller.Controller().pwm(wanted, at_rest), hover)
+    set_point = course.SetPoint(np.zeros(3), np.zeros(3))
+    np.testing.assert_array_equal(controller.Controller().pwm(set_point, at_rest), hover)
     away = {"z": at_rest._replace(position=np.array([0.0, 0.0, -0.1])),
             "roll": at_rest._replace(angles=np.array([0.1, 0.0, 0.0])),
             "pitch": at_rest._replace(angles=np.array([0.0, 0.1, 0.0])),
             "yaw": at_rest._replace(angles=np.array([0.0, 0.0, 0.1]))}[moved]
-    np.testing.assert_array_equal(controller.Controller().pwm(wanted, away) > hover, np.array(more, bool))
+    np.testing.assert_array_equal(controller.Controller().pwm(set_point, away) > hover, np.array(more, bool))
 
 
 def test_a_weak_rotor_gets_the_thrust_it_lost(rotorpy, monkeypatch):
@@ -64,7 +65,7 @@ def test_a_weak_rotor_gets_the_thrust_it_lost(rotorpy, monkeypatch):
     monkeypatch.setattr(course.Course, "total_s", property(lambda self: 5.0, lambda self, value: None), raising=False)
     log = flight.fly(labels.Label("x", "weak_motor", 0.1, "", 3))
     still = slice(450, 500)
-    lifted = vehicle.thrust_of_pwm(np.stack([log[f"m{i}_pwm"][still] for i in (1, 2, 3, 4)])).mean(axis=1)
+    lifted = vehicle.DECLARED.thrust(np.stack([log[f"m{i}_pwm"][still] for i in (1, 2, 3, 4)])).mean(axis=1)
     quarter = 0.25 * vehicle.MASS_KG * vehicle.GRAVITY
     np.testing.assert_allclose(np.sort(lifted), quarter * np.array([1.0, 1.0, 1.0, 1.0 / 0.9]), rtol=0.02)
     assert np.std(log["z_m"][still]) < 0.02 and log["z_m"][still].mean() > 0.15

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .course import Wanted
+from .course import SetPoint
 from .labels import STEP_S
 from .vehicle import ARM_M, GRAVITY, INERTIA, MASS_KG, YAW_ARM_M, pwm_of_thrust
 
@@ -17,7 +17,7 @@ RATE_GAIN, RATE_INTEGRAL, MOST_SUM_RAD = np.array([28.0, 28.0, 12.0]), 25.0, 0.5
 
 
 class Estimate(NamedTuple):
-    """What the loop knows, (3,) each: position, velocity, roll, pitch and yaw, body rates; m, m/s, rad, rad/s."""
+    """State estimate, (3,) each: position, velocity, roll, pitch and yaw, body rates; m, m/s, rad, rad/s."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -31,16 +31,16 @@ class Controller:
     def __init__(self) -> None:
         self.sum_velocity, self.sum_rate = np.zeros(3), np.zeros(3)
 
-    def pwm(self, wanted: Wanted, seen: Estimate) -> np.ndarray:
-        """PWM (4,) for what is wanted and seen."""
-        asked = np.clip(POSITION_GAIN * (wanted.position - seen.position), -MOST_MPS, MOST_MPS)
-        error = asked + wanted.velocity - seen.velocity
+    def pwm(self, set_point: SetPoint, estimate: Estimate) -> np.ndarray:
+        """PWM (4,) for a set-point and a state estimate."""
+        asked = np.clip(POSITION_GAIN * (set_point.position - estimate.position), -MOST_MPS, MOST_MPS)
+        error = asked + set_point.velocity - estimate.velocity
         self.sum_velocity = np.clip(self.sum_velocity + error * STEP_S, -MOST_SUM_M, MOST_SUM_M)
         acceleration = VELOCITY_GAIN * error + VELOCITY_INTEGRAL * self.sum_velocity
         pitch, roll = np.clip(np.array([acceleration[0], -acceleration[1]]) / GRAVITY, -MOST_TILT_RAD, MOST_TILT_RAD)
-        upright = max(np.cos(seen.angles[0]) * np.cos(seen.angles[1]), 0.6)
+        upright = max(np.cos(estimate.angles[0]) * np.cos(estimate.angles[1]), 0.6)
         thrust = MASS_KG * np.clip(GRAVITY + acceleration[2], 2.0, 16.0) / upright
-        rate_error = ANGLE_GAIN * (np.array([roll, pitch, 0.0]) - seen.angles) - seen.rates
+        rate_error = ANGLE_GAIN * (np.array([roll, pitch, 0.0]) - estimate.angles) - estimate.rates
         self.sum_rate = np.clip(self.sum_rate + rate_error * STEP_S, -MOST_SUM_RAD, MOST_SUM_RAD)
         torque = np.array(INERTIA) * (RATE_GAIN * rate_error + RATE_INTEGRAL * self.sum_rate)
         r, p = torque[:2] / (ARM_M / np.sqrt(2.0))

@@ -10,7 +10,7 @@ MOTORS_ON_S, MOTORS_OFF_S = RISE_AT_S - 0.8, LANDING_S - 0.1  #: the latter afte
 BEGIN_M = 0.8  #: where the platform begins
 
 
-class Wanted(NamedTuple):
+class SetPoint(NamedTuple):
     """Position and velocity (3,) that the vehicle should have, m and m/s."""
 
     position: np.ndarray
@@ -28,13 +28,13 @@ class Course:
         self.land_at_s = PASS_AT_S + self.way_m / SPEED_MPS + rng.uniform(2.5, 4.0)
         self.total_s = self.land_at_s + LANDING_S
 
-    def at(self, t: float) -> Wanted:
-        """What is wanted at t, s."""
+    def at(self, t: float) -> SetPoint:
+        """The set-point at t, s."""
         x = min(max(t - PASS_AT_S, 0.0) * SPEED_MPS, self.way_m)
         up = min(max(t - RISE_AT_S, 0.0) / RISE_S, 1.0)
         down = min(max(t - self.land_at_s, 0.0) / LANDING_S, 1.0)
         speed = SPEED_MPS if 0.0 < x < self.way_m else 0.0
-        return Wanted(np.array([x, 0.0, self.height_m * min(up, 1.0 - down)]), np.array([speed, 0.0, 0.0]))
+        return SetPoint(np.array([x, 0.0, self.height_m * min(up, 1.0 - down)]), np.array([speed, 0.0, 0.0]))
 
     def motors_run(self, t: float) -> bool:
         """Whether the motors are on at t, s."""

@@ -11,7 +11,7 @@ from airtouch.logs.flight_log import FlightLog
 from .controller import Controller, Estimate
 from .course import Course
 from .labels import STEP_S, Label
-from .vehicle import ACC_NOISE, GRAVITY, GYRO_NOISE, ORDER, RANGE_NOISE, Craft, craft_of, thrust_of_pwm
+from .vehicle import ACC_NOISE, DECLARED, GRAVITY, GYRO_NOISE, ORDER, RANGE_NOISE, Craft, craft_of
 
 ROWS = 5  #: steps a row of the log: 100 Hz
 #: correlation time, s, and rms, m and m/s, of what position and velocity err slowly; rms of what they err fast. Chosen
@@ -42,7 +42,7 @@ class Sensors:
         self.turned_rad, self.tone, self.drift = rng.uniform(0.0, 2.0 * np.pi), 0.0, np.zeros((2, 3))
 
     def estimate(self, state: State, angles: np.ndarray, resting: bool) -> Estimate:
-        """What the loop sees of a state, a step after the last."""
+        """The estimate of a state, a step after the last."""
         rng, fade = self.rng, STEP_S / DRIFT_S
         self.turned_rad += STEP_S * state["rotor_speeds"][0]
         self.tone = 0.0 if resting else self.amplitude * float(np.sin(self.turned_rad))
@@ -52,11 +52,12 @@ class Sensors:
                               for k, slow, fast in zip("xv", self.drift, FAST, strict=True))
         return Estimate(position, velocity, angles, rates)
 
-    def row(self, specific_force: np.ndarray, range_m: float, seen: Estimate, pwm: np.ndarray) -> np.ndarray:
+    def row(self, specific_force: np.ndarray, range_m: float, estimate: Estimate, pwm: np.ndarray) -> np.ndarray:
         """A row of the log, in the order of COLUMNS."""
         acc = specific_force + self.noise * self.rng.normal(0.0, ACC_NOISE, 3) + self.biases[0] + self.tone
         measured_m = np.round(range_m + STANDING_M + self.rng.normal(0.0, RANGE_NOISE), 3)
-        return np.r_[acc, seen.rates, pwm, measured_m, seen.velocity, seen.position + (0.0, 0.0, STANDING_M)]
+        position = estimate.position + (0.0, 0.0, STANDING_M)
+        return np.r_[acc, estimate.rates, pwm, measured_m, estimate.velocity, position]
 
 
 def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
@@ -65,22 +66,24 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
     course, controller = Course(rng), Controller()
     heading = rng.uniform(0.0, 2.0 * np.pi)
     craft = craft_of(label, np.array([np.cos(heading), np.sin(heading), 0.0]))
-    lasting = np.full(4, 1.0 - label.of("thrust_coeff"))
-    lasting[rng.integers(4)] -= label.of("weak_motor")
+    rotor_factors = np.full(4, 1.0 - label.of("thrust_coeff"))
+    rotor_factors[rng.integers(4)] -= label.of("weak_motor")
     sensors, state = Sensors(label, slow_error, rng), craft.initial_state
-    late, old = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))
-    commands, seen, rows, resting = [np.zeros(4)] * (late + 1), [], [], True
+    delay, latency = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))  # steps
+    commands, estimates, rows, resting = [np.zeros(4)] * (delay + 1), [], [], True
     for step in range(round(course.total_s / STEP_S)):
         t, rotation = step * STEP_S, Rotation.from_quat(state["q"])
         yaw, pitch, roll = rotation.as_euler("ZYX")
-        seen = [*seen, sensors.estimate(state, np.array([roll, pitch, yaw]), resting)][-old - 1:]
-        pwm = controller.pwm(course.at(t), seen[0]) if course.motors_run(t) else np.zeros(4)
-        commands = [*commands, pwm][-late - 1:]
+        estimates = [*estimates, sensors.estimate(state, np.array([roll, pitch, yaw]), resting)][-latency - 1:]
+        pwm = controller.pwm(course.at(t), estimates[0]) if course.motors_run(t) else np.zeros(4)
+        commands = [*commands, pwm][-delay - 1:]
         if step % ROWS == 0:
             down_m = (state["x"][2] - course.surface(state["x"][0])) / max(np.cos(roll) * np.cos(pitch), 0.5)
-            rows.append(sensors.row(_specific_force(craft, state, rotation, resting), down_m, seen[-1], pwm))
+            rows.append(sensors.row(_specific_force(craft, state, rotation, resting), down_m, estimates[-1], pwm))
         sag = label.of("battery_sag") * t / course.total_s
-        craft.factor = lasting * (1.0 - sag) * (1.0 + label.of("ground_effect") * _lift(craft, state, rotation, course))
+        craft.factor = rotor_factors * (1.0 - sag)
+        if strength := label.of("ground_effect"):
+            craft.factor *= 1.0 + strength * _lift(craft, state, rotation, course)
         if gust := label.of("gust"):
             fade = STEP_S / GUST_S
             state["wind"] = (1.0 - fade) * state["wind"] + np.sqrt(2.0 * fade) * gust * GUST_SHARE \
@@ -105,7 +108,7 @@ def _log(table: np.ndarray, label: Label, rng: np.random.Generator) -> FlightLog
 def _speeds(craft: Craft, pwm: np.ndarray) -> np.ndarray:
     """Speeds (4,), rad/s, in RotorPy's order, that a motor goes to at a PWM (4,)."""
     speeds = np.empty(4)
-    speeds[ORDER] = np.sqrt(thrust_of_pwm(pwm) / craft.k_eta)
+    speeds[ORDER] = np.sqrt(DECLARED.thrust(pwm) / craft.k_eta)
     return speeds
 
 

@@ -6,6 +6,8 @@ import numpy as np
 from rotorpy.vehicles.crazyflie_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
 
+from airtouch import vehicle as vehicles
+
 from .labels import Label
 
 MASS_KG, INERTIA = quad_params["mass"], tuple(quad_params[f"I{a}{a}"] for a in "xyz")
@@ -30,6 +32,7 @@ gyro_noise_rms_radps = {GYRO_NOISE}
 range_noise_rms_m = {RANGE_NOISE}
 gravity_mps2 = {GRAVITY}
 """
+DECLARED = vehicles.parse(FILE, "vehicle_a.toml")
 ORDER = [1, 2, 3, 0]  #: RotorPy's rotors front left, front right, rear right, rear left in the log's order
 
 
@@ -63,12 +66,7 @@ def craft_of(label: Label, direction: np.ndarray) -> Craft:
     return Craft(p, state, integrator_kwargs={"method": "RK23", "rtol": 1e-4, "atol": 1e-7})
 
 
-def thrust_of_pwm(pwm: np.ndarray) -> np.ndarray:
-    """Thrust (4,), N, of motors at PWM; 0 at 0."""
-    return np.where(pwm > 0, C0 + C1 * pwm + C2 * pwm * pwm, 0.0)
-
-
 def pwm_of_thrust(thrust: np.ndarray) -> np.ndarray:
-    """PWM (4,), whole numbers from 0 to 65535, of thrusts, N."""
+    """PWM (4,), whole numbers from 0 to 65535, of thrusts, N: the inverse of `DECLARED.thrust`."""
     root = np.sqrt(np.maximum(C1 * C1 - 4.0 * C2 * (C0 - np.maximum(thrust, C0)), 0.0))
     return np.clip(np.round((root - C1) / (2.0 * C2)), 0, 65535)
