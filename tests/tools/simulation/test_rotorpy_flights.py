@@ -73,6 +73,29 @@ def test_a_weak_rotor_gets_the_thrust_it_lost(rotorpy, monkeypatch):
     np.testing.assert_allclose(log["acc_z_mps2"][still].mean(), vehicle.GRAVITY, atol=0.1)
 
 
+@pytest.mark.parametrize("effect", [("none", 0.0), ("ground_effect", 1.4)])
+def test_a_flight_begins_and_ends_on_the_ground(rotorpy, effect):
+    """It leaves the ground after the motors start, and stands on it, 1.2 cm high by its range, when they stop."""
+    *_, flight, _ = rotorpy
+    log = flight.fly(labels.Label("x", *effect, "", 5))
+    running = np.flatnonzero(log["m1_pwm"])
+    before, after = log["zrange_m"][[running[0], running[-1]]]
+    assert max(before, after) < 0.025 and log["zrange_m"].max() > 0.15
+    np.testing.assert_allclose(log["acc_z_mps2"][running[-1] + 10:].mean(), 9.81, atol=0.05)
+
+
+def test_a_rotor_gains_by_the_share_of_its_disc_over_the_platform(rotorpy):
+    """Points drawn evenly in the disc, counted; and all of it, none and half by hand."""
+    _, course, *_ = rotorpy
+    drawn = course.Course(np.random.default_rng(0))
+    points = np.random.default_rng(1).uniform(-1.0, 1.0, (200_000, 2))
+    inside = points[np.hypot(*points.T) < 1.0, 0]
+    for x in (0.77, 0.79, 0.8, 0.815, 1.2, drawn.end_m + 0.01):
+        counted = np.mean([drawn.surface(p) > 0.0 for p in x + 0.03 * inside])
+        np.testing.assert_allclose(drawn.over_platform(np.array(x), 0.03), counted, atol=0.005)
+    np.testing.assert_allclose(course.disc_beyond(np.array([-2.0, 0.0, 2.0])), [1.0, 0.5, 0.0], atol=1e-12)
+
+
 @pytest.mark.parametrize("options", [("--seed", "1"), ("--slow-error", "0")])
 def test_flights_of_other_options_are_not_mixed_in(rotorpy, tmp_path, options):
     """Those without an effect look alike in the manifest, but for the seed and what they err by."""

@@ -21,8 +21,8 @@ GUST_S, GUST_SHARE = 1.0, np.array([1.0, 1.0, 0.5])
 BIAS = 0.25, 0.03  #: of the accelerometer, m/s^2, and the gyro, rad/s, at strength 1
 GYRO_OVER_ACC = 0.05  #: of a vibration, rad/s over m/s^2; chosen, as in FLIGHTS/peers
 STANDING_M, ROTORS_M = 0.012, 0.02  #: range at rest, and height of the rotors over the vehicle's lowest point
-#: gym-pybullet-drones' formula of ground effect: coefficient and rotor radius, m; least height, m, chosen
-GROUND, RADIUS_M, LEAST_M = 11.37, 0.0231348, 0.02
+GROUND, RADIUS_M = 11.36859, 0.0231348  #: gym-pybullet-drones' ground effect: coefficient and rotor radius, m
+LEAST_M = 0.25 * RADIUS_M * np.sqrt(15.0 * GROUND / 4.0)  #: its least height of a rotor, 3.8 cm
 FALLEN_TILT_RAD = 1.0  #: beyond which a flight has failed
 COLUMNS = (*(f"acc_{a}_mps2" for a in "xyz"), *(f"gyro_{a}_radps" for a in "xyz"), *(f"m{i}_pwm" for i in (1, 2, 3, 4)),
            "zrange_m", *(f"v{a}_mps" for a in "xyz"), *(f"{a}_m" for a in "xyz"))
@@ -119,10 +119,11 @@ def _specific_force(craft: Craft, state: State, rotation: Any, resting: bool) ->
 
 
 def _lift(craft: Craft, state: State, rotation: Any, course: Course) -> np.ndarray:
-    """Share (4,) of its thrust that each rotor gains by what lies below it, in RotorPy's order."""
+    """Share (4,) of its thrust that each rotor gains by what lies below its disc, in RotorPy's order."""
     places = state["x"] + rotation.apply(craft.rotor_geometry)
-    height = places[:, 2] + ROTORS_M - np.array([course.surface(x) for x in places[:, 0]])
-    return GROUND * (RADIUS_M / (4.0 * np.maximum(height, LEAST_M))) ** 2
+    floor, platform = (GROUND * (RADIUS_M / (4.0 * np.maximum(places[:, 2] + ROTORS_M - top_m, LEAST_M))) ** 2
+                       for top_m in (0.0, course.top_m))
+    return floor + course.over_platform(places[:, 0], RADIUS_M) * (platform - floor)
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:
