@@ -3,12 +3,12 @@
     python tools/simulation/rotorpy_flights.py OUT [--each 3] [--nominal 12] [--seed 0]    # 10 s of one core a flight
     python tools/diagnosis/gap_peers.py OUT
 
-Each flight takes off, hovers, passes over a platform, hovers and sinks, with one effect or none; its motors stop a few
-centimetres above the ground. Body and the laws of motor lag and drag are RotorPy's, the rest is added
-(tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate
-on, the flights and a manifest.csv of the effect in each. Flights that are there already are kept, so that a stopped
-run goes on; a set of other options needs another OUT. A flight in which the vehicle falls is left out of the manifest,
-with an error at the end. Needs the extra `bench`. host/docs/gap-real.md has the figures.
+Each flight takes off, hovers, passes over a platform, hovers and lands, with one effect or none; its motors run on for
+a second or two while it stands. Body and the laws of motor lag and drag are RotorPy's, the rest is added
+(tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate on, the flights and a manifest.csv of
+the effect in each. Flights that are there already are kept, so that a stopped run goes on; a set of other options needs
+another OUT. A flight in which the vehicle falls is left out of the manifest, with an error at the end. Needs the extra
+`bench`. host/docs/gap-real.md has the figures.
 """
 
 import argparse

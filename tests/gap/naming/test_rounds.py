@@ -45,7 +45,7 @@ def test_companion_must_gain_longer_gain(drag, names):
 def test_longer_variant_must_gain_longer_gain_in_any_order():
     short, long = (Hypothesis("gust", (None,) * n, gain, (None, None), full=True) for n, gain in ((1, 30.0), (2, 31.0)))
     for judged in ([short, long], [long, short]):
-        assert rounds.best_of_each(judged, 0)["gust"] is short
+        assert rounds.best_of_each(None, judged, 0)["gust"] is short, "no companion is asked about"
 
 
 def test_effect_falls_behind_its_companion():

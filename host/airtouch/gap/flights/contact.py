@@ -3,10 +3,14 @@
 import numpy as np
 
 from airtouch.gap.flights.clock import PERIOD_S
+from airtouch.gap.flights.missing import interpolate_missing
+from airtouch.logs.segments import LEAST_HEIGHT_M, runs
 from airtouch.robust import deviation
 
 CONTACT_S = 0.3  #: seconds excluded before and after take-off, touch-down and a collision; chosen
 SETTLED_S = 1.0  #: seconds after the motors have stopped in which the vehicle may still bounce; chosen
+#: height over what is read standing, m, below which legs may touch, and seconds before and after it; chosen
+TOUCH_M, TOUCH_S = 0.006, 0.05
 KNOCK = 7.0  #: robust standard deviations at rest from which a sample is a knock; chosen
 LEAST_AT_REST_MPS2 = 1e-3  #: standard deviation at rest that an accelerometer has at least; chosen
 #: robust standard deviations in flight above which the vehicle hit something: over the 35 that steps of a set-point
@@ -49,6 +53,23 @@ def jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.nd
     around = within(hit, CONTACT_S)
     collided = around[air].mean() < MOST_JOLTED or hit[air].mean() < MOST_HIT
     return around if collided else np.zeros_like(around)
+
+
+def standing(range_m: np.ndarray, ground: np.ndarray, running: np.ndarray, leg_m: float) -> np.ndarray:
+    """Samples (n,), bool, at which the vehicle stands with its motors on, before it lifts off or after it came down.
+
+    range_m (n,): down range; ground (n,): not in the air by its commands; running (n,): a motor is commanded; leg_m:
+    what the range reads standing, where the log shows no rest.
+    """
+    height = interpolate_missing(range_m)
+    rest = ground & ~running & (height < LEAST_HEIGHT_M)  # in a hand it reads more
+    low = within(height < (float(np.median(height[rest])) if rest.any() else leg_m) + TOUCH_M, TOUCH_S)
+    out = np.zeros(len(low), bool)
+    for start, stop in runs(~ground):
+        high = np.flatnonzero(~low[start:stop])
+        if len(high):
+            out[start:start + high[0]] = out[start + high[-1] + 1:stop] = True
+    return out
 
 
 def near_ground(ground: np.ndarray, running: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from airtouch.errors import AirTouchError
 from airtouch.gap.flights.attitude import attitude, in_world_axes, world_force
 from airtouch.gap.flights.clock import PERIOD_S, at_100_hz, with_lost_rows
-from airtouch.gap.flights.contact import jolts, knocks, near_ground, within
+from airtouch.gap.flights.contact import TOUCH_M, TOUCH_S, jolts, knocks, near_ground, standing, within
 from airtouch.gap.flights.fitness import LEAST_AIR_S, cannot_tell, notes_of, stamped_at_arrival, without_bad_columns
 from airtouch.gap.flights.heights import rotor_heights, standing_height
 from airtouch.gap.flights.missing import interpolate_missing
@@ -27,8 +27,6 @@ from airtouch.simulation.flight import prepare
 from airtouch.vehicle import Vehicle
 
 GROUND = KINDS.index("ground")
-#: height above standing, m, below which legs may touch in flight, and seconds before and after it; chosen
-TOUCH_M, TOUCH_S = 0.006, 0.05
 #: samples of a hole in a column up to which a straight line stands for what was measured, as where a log is resampled
 MOST_BRIDGED = round(LONGEST_BRIDGE_S / PERIOD_S)
 HOLE_NOTE = ("{:.1f} s in the air are no evidence: accelerations, rates or motor commands are missing there for more "
@@ -47,8 +45,9 @@ class Flight:
     rotation; phase (n,): places in `segments.KINDS`; usable (n,): measured, and not close to a touch of the ground;
     clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure; lost (n,):
     rows that did not arrive; unmeasured (n,): rows that did, in a hole of a column of the IMU or of the motor commands
-    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; notes, cannot:
-    sentences on what was left out of the log, and on what no diagnosis of it can tell.
+    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; idling (n,): in
+    flight by the commands and measured, but not usable, because it stands with its motors on or has just lifted off;
+    notes, cannot: sentences on what was left out of the log, and on what no diagnosis of it can tell.
     """
 
     name: str
@@ -64,6 +63,7 @@ class Flight:
     lost: np.ndarray
     unmeasured: np.ndarray
     touching: np.ndarray
+    idling: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
@@ -122,12 +122,14 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     unmeasured = _long_holes(log) & ~lost
     if (unmeasured & ~ground).any():
         notes = (*notes, HOLE_NOTE.format((unmeasured & ~ground).sum() * PERIOD_S, LONGEST_BRIDGE_S))
-    touched = near_ground(ground, running) | knocks(force, ground & ~running) | jolts(force, rates, ~ground)
-    usable = ~lost & ~unmeasured & ~touched
+    on_ground = ground | _standing(log, ground, running, vehicle)
+    touched = knocks(force, ground & ~running) | jolts(force, rates, ~ground)
+    measured, near = ~lost & ~unmeasured & ~touched, near_ground(on_ground, running)
+    usable, idling = measured & ~near, measured & near & ~near_ground(ground, running)
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost,
-                  unmeasured=unmeasured, touching=touching, notes=notes, cannot=cannot)
+                  unmeasured=unmeasured, touching=touching, idling=idling, notes=notes, cannot=cannot)
 
 
 def _long_holes(log: FlightLog) -> np.ndarray:
@@ -236,6 +238,13 @@ def without_columns(flight: Flight, vehicle: Vehicle, columns: Container[str]) -
         return flight
     angles = attitude(log)
     return replace(flight, log=log, signals=_signals(log, angles, flight.body_to_world, flight.phase, vehicle)[0])
+
+
+def _standing(log: FlightLog, ground: np.ndarray, running: np.ndarray, vehicle: Vehicle) -> np.ndarray:
+    """`contact.standing` of a log, bool (n,); nowhere without a down range."""
+    if not log.has("zrange_m"):
+        return np.zeros(len(log), bool)
+    return standing(log["zrange_m"], ground, running, float(prepare(vehicle, ())[0][0]["leg_below_range"]))
 
 
 def _body_force(log: FlightLog, body_to_world: np.ndarray, gravity: float) -> np.ndarray:

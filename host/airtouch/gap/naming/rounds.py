@@ -14,6 +14,7 @@ from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
 from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, LONGER_GAIN, PROMISING
 from airtouch.gap.naming.records import Hypothesis, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
+from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.signature import COMPANIONS
 from airtouch.gap.signatures.term import Terms
@@ -29,7 +30,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypo
     start = start_of(trial, base)
     variants, not_fitted = _screen(start, candidates, progress, promising)
     fitted = map_on_two_cores(lambda v: _fit_variant(trial, v, base), variants)
-    best = best_of_each([*fitted, *not_fitted], len(start.terms))
+    best = best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
     return with_evidence(trial.data, best, start.gain)
 
 
@@ -43,7 +44,7 @@ def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> d
     variants, not_fitted = _screen(start_of(trial, None), candidates, every_random=True)
     one_by_one = [v for v in variants if not _is_tried_alone(v)]
     fitted = map_on_two_cores(lambda v: cross_validated(trial, v, None), one_by_one)
-    best = best_of_each([*fitted, *not_fitted], 0)
+    best = best_of_each(trial, [*fitted, *not_fitted], 0)
     return {name: _one_by_one(c, [f for f in fitted if f.name == name]) for name, c in best.items()}
 
 
@@ -97,7 +98,7 @@ def _by_promise(screened: Sequence[Hypothesis], gain: float, promising: Containe
     return worth_a_fit, others
 
 
-def best_of_each(hypotheses: Sequence[Hypothesis], before: int) -> dict[str, Hypothesis]:
+def best_of_each(trial: Trial, hypotheses: Sequence[Hypothesis], before: int) -> dict[str, Hypothesis]:
     """The best hypothesis of each candidate, by name, those that only their companion carries put behind it.
 
     before: number of terms of the base.
@@ -107,21 +108,27 @@ def best_of_each(hypotheses: Sequence[Hypothesis], before: int) -> dict[str, Hyp
         old = best.get(new.name)
         if old is None or _is_better(new, old):
             best[new.name] = new
-    return _behind_companion(best, before)
+    return _behind_companion(trial, best, before)
 
 
-def _behind_companion(best: Mapping[str, Hypothesis], before: int) -> dict[str, Hypothesis]:
+def _behind_companion(trial: Trial, best: Mapping[str, Hypothesis], before: int) -> dict[str, Hypothesis]:
     """The best hypotheses by name, with the gain of an effect lowered where its companion alone gains nearly as much.
 
-    An effect that gains less than COMPANION_GAIN over its companion explains nothing itself. Its gain is put
-    COMPANION_GAIN behind that of the companion, so that the companion is taken. before: number of terms of the base.
+    Beside its companion an effect must gain what a further effect must gain to be named. One that gains less explains
+    little itself: its gain is put COMPANION_GAIN behind that of the companion, so that the companion is taken. before:
+    number of terms of the base.
     """
     out = dict(best)
     for name, other in COMPANIONS.items():
         both, alone = out.get(name), out.get(other)
-        if both and alone and len(both.terms) > before + 1 and both.gain < alone.gain + COMPANION_GAIN:
+        if both and alone and len(both.terms) > before + 1 and _explains_little(trial, alone, both):
             out[name] = replace(both, gain=min(both.gain, alone.gain - COMPANION_GAIN))
     return out
+
+
+def _explains_little(trial: Trial, alone: Hypothesis, both: Hypothesis) -> bool:
+    """Whether an effect with its companion gains less over the companion alone than a further effect needs."""
+    return both.gain - alone.gain < least_further_gain(trial, alone, both) or is_random_misfit(trial, alone, both)
 
 
 def _is_better(new: Hypothesis, old: Hypothesis) -> bool:
