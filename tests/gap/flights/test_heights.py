@@ -52,3 +52,5 @@ def test_without_a_range_the_floor_is_flat_and_standing_is_known():
     assert rotor_heights(log_of(x_m=z), turn, row_of(np.zeros(4), np.zeros(4)), ground) is None
     assert standing_z(z, ground) == 0.03 and standing_z(z + 1.0, np.zeros(n, bool)) == MARKER_M
     assert standing_z(z - 0.02, np.zeros(n, bool)) == pytest.approx(0.01)
+    carried = np.r_[np.linspace(1.2, 0.1, 40), z]
+    assert standing_z(carried, np.r_[np.ones(40, bool), ground]) == 0.03, "carried to its place before"

@@ -96,3 +96,13 @@ def test_a_burst_in_one_of_two_tables_is_none_in_the_other(monkeypatch):
     gate, _ = burst_gate(data, FORCE_BURSTS)
     first, second = (inside(gate, f) for f in data.flights)
     assert first[1000:1050].all() and not second.any()
+
+
+def test_idle_motors_on_the_ground_are_no_burst_and_no_calm(nominal_flight, study):
+    """Props that turn slowly on the ground, as after arming: the samples count neither in the air nor at rest."""
+    idle = nominal_flight.on_ground & (np.arange(len(nominal_flight)) < len(nominal_flight) // 2)
+    waits = replace(nominal_flight, pwm=np.where(idle[:, None], 5000.0, nominal_flight.pwm))
+    assert idle.sum() > 50
+    for one in (nominal_flight, waits):
+        counts = passing_bursts.residual_in_band(study, one, YAW_BURSTS.column, YAW_BURSTS.band_hz)[1]
+        assert counts.any() and not counts[idle].any()

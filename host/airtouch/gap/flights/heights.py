@@ -6,11 +6,13 @@ from airtouch.gap.flights.attitude import smoothed_speed
 from airtouch.gap.flights.clock import PERIOD_S
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.logs.flight_log import POSITION, VELOCITY, FlightLog
+from airtouch.logs.segments import LEAST_HEIGHT_M
 
 MARKER_M = 0.05  #: height over the floor of a motion-capture marker on a Crazyflie that stands; chosen
 COURSE_S = 0.2  #: standard deviation of the Gaussian that smooths velocity before its direction is taken; chosen
 MOVING_MPS = 0.05  #: speed up to which the vehicle has no direction of flight; chosen
 MOST_AHEAD = 100  #: samples at most by which a rotor passes an edge before or after the range sensor; chosen
+LOWEST_PERCENT = 5.0  #: of the readings on the ground: the lowest; chosen, so that some wrong ones do not count
 STEP_M = 0.06  #: change of the down range between two samples from which it is a step of the floor; chosen
 
 
@@ -66,9 +68,13 @@ def _samples_ahead(log: FlightLog, body_to_world: np.ndarray, row: np.void) -> n
 def standing_z(z: np.ndarray, on_ground: np.ndarray) -> float:
     """What z_m (n,) reads when the vehicle stands: its median on the ground where the log holds that.
 
-    Else the lowest value, at most MARKER_M: a log cut out of a flight may never come down.
+    What is LEAST_HEIGHT_M over the lowest readings there is in a hand. Else the lowest value, at most MARKER_M: a log
+    cut out of a flight may never come down.
     """
-    return float(np.median(z[on_ground])) if on_ground.any() else float(min(z.min(), MARKER_M))
+    if not on_ground.any():
+        return float(min(z.min(), MARKER_M))
+    resting = z[on_ground]
+    return float(np.median(resting[resting <= np.percentile(resting, LOWEST_PERCENT) + LEAST_HEIGHT_M]))
 
 
 def _altitude(log: FlightLog, height: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from scipy.special import stdtrit
 
-from airtouch.gap.flights.fitness import log_kind
+from airtouch.gap.flights.fitness import log_kind, logged_hz
 from airtouch.gap.flights.flight import GROUND, Flight
 from airtouch.gap.flights.hardness import hardness_of, tilt_degrees
 from airtouch.gap.signals.channels import CHANNEL_WORDS, CHANNELS, COLUMN, TORQUE, residual
@@ -137,11 +137,15 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
 
 
 def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list[str]:
-    """A note on each flight whose log is of another kind than every baseline log."""
-    kinds = {log_kind(f.log) for f in baseline}
-    return [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's "
-            f"({', '.join(sorted(kinds))}): what differs may be the logs; take a baseline that was logged like the test"
-            for f in flights if kinds and log_kind(f.log) not in kinds]
+    """A note on each flight whose log is of another kind, or of another rate, than every baseline log."""
+    kinds, rates = {log_kind(f.log) for f in baseline}, {logged_hz(f.log) for f in baseline}
+    known_kinds, known_rates = ", ".join(sorted(kinds)), ", ".join(map(str, sorted(rates)))
+    of_kind = [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({known_kinds}): what "
+               "differs may be the logs; take a baseline that was logged like the test"
+               for f in flights if kinds and log_kind(f.log) not in kinds]
+    return of_kind + [f"{f.file_name}: logged at {logged_hz(f.log)} Hz, the baseline at {known_rates} Hz: less folds "
+                      "into the band of a faster log, which may look like a delay or slow motors; log both at one rate"
+                      for f in flights if rates and logged_hz(f.log) not in rates]
 
 
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
-from airtouch.gap.flights.flight import PERIOD_S, Flight
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
 from airtouch.gap.passing.gate_search import ENDS, LEAST_BLOCKS, MOST_OF_FLIGHTS, best_intervals, interval_cost
 from airtouch.gap.signals.channels import COLUMN, residual
@@ -73,7 +73,7 @@ def residual_in_band(study: Study, flight: Flight, column: int, band_hz: tuple[f
     None counts on the ground, at take-off or landing, nor one that bridges lost rows; straight lines lead over them.
     """
     values = residual(flight, study.vehicle, study.calibration)[:, column]
-    counts = ~(flight.on_ground | flight.bridged | np.isin(flight.phase, ENDS)) & np.isfinite(values)
+    counts = ~(flight.bridged | np.isin(flight.phase, (GROUND, *ENDS))) & np.isfinite(values)
     low, high = (2.0 * hertz * PERIOD_S for hertz in band_hz)
     out = both_ways(highpass(low), interpolate_missing(np.where(counts, values, np.nan)))
     return (both_ways(lowpass(high), out) if high < 1.0 else out), counts
