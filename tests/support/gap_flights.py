@@ -38,7 +38,7 @@ def flight(seconds, force=0.0, gyro=0.0, phase=HOVER, name="synthetic", lost=Non
     hover = Flight(
         name, log, replay.signals_of(log, VEHICLE), np.zeros((n, 3)), np.zeros((n, 3)) + gyro, pwm,
         np.tile(np.eye(3), (n, 1, 1)), np.where(resting, GROUND, phase).astype(np.int8), np.ones(n, bool),
-        np.zeros(n), np.zeros(n, bool) if lost is None else lost, *(np.zeros(n, bool) for _ in range(3)))
+        np.zeros(n), np.zeros(n, bool) if lost is None else lost, np.zeros(n, bool), np.zeros(n, bool))
     return replace(hover, acceleration=force - residual(hover, VEHICLE)[:, :3])
 
 

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from airtouch.gap.flights.clock import PERIOD_S
-from airtouch.gap.flights.contact import CONTACT_S, SETTLED_S, TOUCH_S, jolts, knocks, near_ground, standing, within
+from airtouch.gap.flights.contact import (
+    CONTACT_S,
+    SETTLED_S,
+    SHORT_STAND_S,
+    TOUCH_S,
+    jolts,
+    knocks,
+    near_ground,
+    standing,
+    within,
+)
 
 N = 1000
 NOISE = np.random.default_rng(0).normal(size=(N, 3))
@@ -57,23 +67,30 @@ def test_legs_may_touch_around_take_off_and_landing_but_not_at_rest_before():
 
 @pytest.mark.parametrize("at_rest_m", [0.012, 0.0, 1.0, None])
 def test_a_vehicle_stands_until_it_lifts_off_and_from_its_touch_down_on(at_rest_m):
-    """Motors from 2 to 8 s, in the air from 3 to 7 s, low over a platform from 5 to 5.4 s; None: the log shows no rest.
+    """Motors from 1 to 9 s, in the air from 3 to 7 s, low over a platform from 5 to 5.4 s; None: the log shows no rest.
 
     Before, it stands on the ground, or is held in a hand 1 m high.
     """
     sample, legs_m = np.arange(N), 0.012 if at_rest_m in (None, 1.0) else at_rest_m
-    running = np.ones(N, bool) if at_rest_m is None else (sample >= 200) & (sample < 800)
+    running = np.ones(N, bool) if at_rest_m is None else (sample >= 100) & (sample < 900)
     flying = (sample >= 300) & (sample < 700)
     high = flying & ~((sample >= 500) & (sample < 540))
     height = legs_m + np.where(high, 0.3, 0.0) + 0.0015 * NOISE[:, 0].clip(-3, 3)
     if at_rest_m == 1.0:
-        height[:200] = 1.0
-    height[[250, 350, 650]] = np.nan  # samples without a range
+        height[:100] = 1.0
+    height[210:230] = height[350:352] = np.nan  # samples without a range
     stands = standing(height, ~running, running, leg_m=0.012)
     edge = int(TOUCH_S / PERIOD_S)
     first, last = np.flatnonzero(running)[[0, -1]]
     assert stands[first:300].all() and stands[700:last + 1].all() and not stands[~running].any()
     assert not stands[300 + edge + 1:700 - edge].any(), "a low pass is no touch-down"
+
+
+@pytest.mark.parametrize(("wait_s", "stands"), [(SHORT_STAND_S - 0.1, False), (SHORT_STAND_S + 0.1, True)])
+def test_a_short_stand_is_part_of_a_take_off(wait_s, stands):
+    sample, first = np.arange(N), 200 + round(wait_s / PERIOD_S)
+    height = np.where(sample < first + 5, 0.012, 0.3)  # low for TOUCH_S more
+    assert standing(height, sample < 200, sample >= 200, 0.012)[200:first].all() == stands
 
 
 def test_a_vehicle_that_never_stands_with_its_motors_on():

@@ -56,7 +56,7 @@ def test_seconds_on_the_ground_with_the_motors_on_are_no_evidence(log):
     in_air = waits.phase != KINDS.index("ground")
     assert in_air[first:first + 300].sum() > 250, "by its commands it flies"
     assert not waits.usable[first:first + 300].any()
-    np.testing.assert_array_equal(waits.usable[first + 400:], whole.usable[first + 100:])
+    np.testing.assert_array_equal(waits.usable[first + 450:], whole.usable[first + 150:])
 
 
 def test_a_row_lost_in_mid_flight_is_lost_and_no_jitter(log):

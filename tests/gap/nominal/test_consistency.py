@@ -137,7 +137,8 @@ def test_a_log_of_another_kind_than_the_baselines_is_told(meta, baseline, unlike
 @pytest.mark.parametrize(("meta", "baseline", "told"), [
     ({"resampled": {"from_hz": 199.6}}, [{}, {}], "logged at 200 Hz, the baseline at 100 Hz"),
     ({}, [{"resampled": {"from_hz": 500.0}}, {"resampled": {"from_hz": 200.0}}], "the baseline at 200, 500 Hz"),
-    ({"resampled": {"from_hz": 200.4}}, [{"resampled": {"from_hz": 199.0}}], ""),
+    ({"resampled": {"from_hz": 125.1}}, [{"resampled": {"from_hz": 124.9}}], ""),
+    ({"resampled": {"from_hz": 200}}, [{}], "logged at 200 Hz"),
     ({"resampled": "by hand"}, [{"resampled": {"from_hz": float("nan")}}], ""),
     ({"resampled": {"from_hz": 200.0}}, [], "")])
 def test_a_log_of_another_rate_than_the_baselines_is_told(meta, baseline, told):

@@ -1,4 +1,4 @@
-"""A drawn mission: take off, hover, pass over a platform, hover, sink."""
+"""A drawn mission: take off, hover, pass over a platform, hover, land."""
 
 from typing import NamedTuple
 

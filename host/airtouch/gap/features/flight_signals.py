@@ -72,10 +72,10 @@ def signals_of(flight: Flight, vehicle: Vehicle) -> FlightSignals:
         _rate(np.unwrap(angles, axis=0)) - rates, down])
     if flight.bridged.any():
         table = interpolate_missing(np.where(flight.bridged[:, None], np.nan, table))
-    usable = (flight.usable | flight.idling) & ~_touched(flight, vehicle)  # as the shipped library was learned
-    good = usable & ~flight.bridged
+    touched = _touched(flight, vehicle)
+    good = flight.usable & ~flight.bridged & ~touched
     rest = flight.on_ground & good
-    return FlightSignals(replace(flight, usable=usable), table, velocity, angles,
+    return FlightSignals(replace(flight, usable=flight.usable & ~touched), table, velocity, angles,
                          interpolate_missing(log["z_m"]), (flight.phase != GROUND) & good,
                          rest if rest.any() else flight.on_ground)
 

@@ -11,6 +11,9 @@ CONTACT_S = 0.3  #: seconds excluded before and after take-off, touch-down and a
 SETTLED_S = 1.0  #: seconds after the motors have stopped in which the vehicle may still bounce; chosen
 #: height over what is read standing, m, below which legs may touch, and seconds before and after it; chosen
 TOUCH_M, TOUCH_S = 0.006, 0.05
+#: seconds up to which a vehicle that stands with its motors on is taking off or landing, as in every flight; chosen:
+#: longer than the 0.7 to 1 s of the authors' take-offs, and shorter than a wait
+SHORT_STAND_S = 1.2
 KNOCK = 7.0  #: robust standard deviations at rest from which a sample is a knock; chosen
 LEAST_AT_REST_MPS2 = 1e-3  #: standard deviation at rest that an accelerometer has at least; chosen
 #: robust standard deviations in flight above which the vehicle hit something: over the 35 that steps of a set-point
@@ -56,10 +59,12 @@ def jolts(force: np.ndarray, rates: np.ndarray | None, air: np.ndarray) -> np.nd
 
 
 def standing(range_m: np.ndarray, ground: np.ndarray, running: np.ndarray, leg_m: float) -> np.ndarray:
-    """Samples (n,), bool, at which the vehicle stands with its motors on, before it lifts off or after it came down.
+    """Samples (n,), bool, at which the vehicle waits on the ground with its motors on, before or after it flew.
 
-    range_m (n,): down range; ground (n,): not in the air by its commands; running (n,): a motor is commanded; leg_m:
-    what the range reads standing, where the log shows no rest.
+    A wait is longer than SHORT_STAND_S, before the first lift-off or after the last touch-down of a stretch with the
+    motors on: a stop between is not told from a low pass. range_m (n,): down range; ground (n,): not in the air by its
+    commands; running (n,): a motor is commanded; leg_m: what the range reads standing, where no rest in the log reads
+    less than LEAST_HEIGHT_M.
     """
     height = interpolate_missing(range_m)
     rest = ground & ~running & (height < LEAST_HEIGHT_M)  # in a hand it reads more
@@ -68,7 +73,8 @@ def standing(range_m: np.ndarray, ground: np.ndarray, running: np.ndarray, leg_m
     for start, stop in runs(~ground):
         high = np.flatnonzero(~low[start:stop])
         if len(high):
-            out[start:start + high[0]] = out[start + high[-1] + 1:stop] = True
+            for a, b in ((start, start + high[0]), (start + high[-1] + 1, stop)):
+                out[a:b] = (b - a) * PERIOD_S > SHORT_STAND_S
     return out
 
 

@@ -82,11 +82,11 @@ def log_kind(log: FlightLog) -> str:
     return str(log.meta.get("origin_format") or log.meta.get("format", "")).split("-")[0]
 
 
-def logged_hz(log: FlightLog) -> int:
-    """Rate at which a log that is at 100 Hz now was logged, rounded to 10 Hz."""
+def logged_hz(log: FlightLog) -> float:
+    """Rate, Hz, at which a log that is at 100 Hz now was logged."""
     resampled = log.meta.get("resampled")
     hertz = resampled.get("from_hz") if isinstance(resampled, dict) else None
-    return 10 * round(hertz / 10.0) if isinstance(hertz, float) and np.isfinite(hertz) else 100
+    return float(hertz) if isinstance(hertz, int | float) and np.isfinite(hertz) else 100.0
 
 
 def stamped_at_arrival(log: FlightLog) -> bool:

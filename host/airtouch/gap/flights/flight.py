@@ -45,9 +45,8 @@ class Flight:
     rotation; phase (n,): places in `segments.KINDS`; usable (n,): measured, and not close to a touch of the ground;
     clock_s (m,): logged times of the rows that arrived minus the regular ones, as far as those are sure; lost (n,):
     rows that did not arrive; unmeasured (n,): rows that did, in a hole of a column of the IMU or of the motor commands
-    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; idling (n,): in
-    flight by the commands and measured, but not usable, because it stands with its motors on or has just lifted off;
-    notes, cannot: sentences on what was left out of the log, and on what no diagnosis of it can tell.
+    that is longer than LONGEST_BRIDGE_S; touching (n,): in flight, so low that the legs may touch; notes, cannot:
+    sentences on what was left out of the log, and on what no diagnosis of it can tell.
     """
 
     name: str
@@ -63,7 +62,6 @@ class Flight:
     lost: np.ndarray
     unmeasured: np.ndarray
     touching: np.ndarray
-    idling: np.ndarray
     notes: tuple[str, ...] = ()
     cannot: tuple[str, ...] = ()
     workspace: Workspace = field(default_factory=Workspace, init=False, compare=False, repr=False)
@@ -122,14 +120,13 @@ def ready(log: FlightLog, vehicle: Vehicle) -> Flight:
     unmeasured = _long_holes(log) & ~lost
     if (unmeasured & ~ground).any():
         notes = (*notes, HOLE_NOTE.format((unmeasured & ~ground).sum() * PERIOD_S, LONGEST_BRIDGE_S))
-    on_ground = ground | _standing(log, ground, running, vehicle)
-    touched = knocks(force, ground & ~running) | jolts(force, rates, ~ground)
-    measured, near = ~lost & ~unmeasured & ~touched, near_ground(on_ground, running)
-    usable, idling = measured & ~near, measured & near & ~near_ground(ground, running)
+    near = near_ground(ground | _standing(log, ground, running, vehicle), running)
+    touched = near | knocks(force, ground & ~running) | jolts(force, rates, ~ground)
+    usable = ~lost & ~unmeasured & ~touched
     _check_long_enough(~ground & usable, name, "in the air without a lost row or contact")
     return Flight(name=name, log=log, signals=signals, acceleration=force, rates=rates, pwm=pwm,
                   body_to_world=body_to_world, phase=phase, usable=usable, clock_s=clock, lost=lost,
-                  unmeasured=unmeasured, touching=touching, idling=idling, notes=notes, cannot=cannot)
+                  unmeasured=unmeasured, touching=touching, notes=notes, cannot=cannot)
 
 
 def _long_holes(log: FlightLog) -> np.ndarray:

@@ -66,10 +66,10 @@ def _samples_ahead(log: FlightLog, body_to_world: np.ndarray, row: np.void) -> n
 
 
 def standing_z(z: np.ndarray, on_ground: np.ndarray) -> float:
-    """What z_m (n,) reads when the vehicle stands: its median on the ground where the log holds that.
+    """What z_m (n,), without NaN, reads when the vehicle stands: its median on the ground where the log holds that.
 
-    What is LEAST_HEIGHT_M over the lowest readings there is in a hand. Else the lowest value, at most MARKER_M: a log
-    cut out of a flight may never come down.
+    What is LEAST_HEIGHT_M over the lowest readings there counts as in a hand, also where the estimate has drifted. Else
+    the lowest value, at most MARKER_M: a log cut out of a flight may never come down.
     """
     if not on_ground.any():
         return float(min(z.min(), MARKER_M))

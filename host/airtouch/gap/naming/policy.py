@@ -17,7 +17,7 @@ from airtouch.gap.study import Study
 LEAST_GAIN = 12.0
 #: that a variant with a random part or a companion must gain over the same effect without (`rounds`)
 LONGER_GAIN = LEAST_GAIN
-#: that an effect with its companion must gain over the companion alone, else it is put as far behind (`rounds`)
+#: by which an effect that gains too little over its companion alone is put behind it (`rounds`)
 COMPANION_GAIN = LEAST_GAIN
 #: that a passing effect must gain over those that always act, and have as evidence; what it gains up to
 #: here counts whatever nominal flights show (`passing_effect`)

@@ -36,6 +36,7 @@ FAR_SIMULATED = 0.1 * FAR
 APART = np.array([0.2, 0.2, 0.2, 4.0, 4.0, 4.0])
 SURE = 6.0  #: standard errors of a flight's trim that this range must exceed as well; chosen
 PARTS = 8  #: equal parts of a flight, whose means give the trim's standard error
+SAME_RATE = 0.05  #: relative difference up to which two logs have one rate; chosen
 
 
 def split_unlike(vehicle: Vehicle, flights: Sequence[Flight], far: np.ndarray) -> tuple[list[Flight], list[str]]:
@@ -139,13 +140,15 @@ def flown_unlike(study: Study, flights: Sequence[Flight]) -> list[str]:
 def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list[str]:
     """A note on each flight whose log is of another kind, or of another rate, than every baseline log."""
     kinds, rates = {log_kind(f.log) for f in baseline}, {logged_hz(f.log) for f in baseline}
-    known_kinds, known_rates = ", ".join(sorted(kinds)), ", ".join(map(str, sorted(rates)))
+    known_kinds, known_rates = ", ".join(sorted(kinds)), ", ".join(sorted({f"{r:.0f}" for r in rates}))
     of_kind = [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({known_kinds}): what "
                "differs may be the logs; take a baseline that was logged like the test"
                for f in flights if kinds and log_kind(f.log) not in kinds]
-    return of_kind + [f"{f.file_name}: logged at {logged_hz(f.log)} Hz, the baseline at {known_rates} Hz: less folds "
-                      "into the band of a faster log, which may look like a delay or slow motors; log both at one rate"
-                      for f in flights if rates and logged_hz(f.log) not in rates]
+    other_rate = [(f.file_name, hertz) for f, hertz in ((f, logged_hz(f.log)) for f in flights)
+                  if rates and min(abs(hertz / r - 1.0) for r in rates) > SAME_RATE]
+    return of_kind + [f"{name}: logged at {hertz:.0f} Hz, the baseline at {known_rates} Hz: less folds into the band of "
+                      "a faster log, which may look like a delay or slow motors; log both at one rate"
+                      for name, hertz in other_rate]
 
 
 def trims(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[Active] = ()) -> np.ndarray:
