@@ -144,10 +144,11 @@ def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list
     of_kind = [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({known_kinds}): what "
                "differs may be the logs; take a baseline that was logged like the test"
                for f in flights if kinds and log_kind(f.log) not in kinds]
-    other_rate = [(f.file_name, hertz) for f, hertz in ((f, logged_hz(f.log)) for f in flights)
+    logged = [(f.file_name, logged_hz(f.log)) for f in flights]
+    other_rate = [(name, hertz) for name, hertz in logged
                   if rates and min(abs(hertz / r - 1.0) for r in rates) > SAME_RATE]
-    return of_kind + [f"{name}: logged at {hertz:.0f} Hz, the baseline at {known_rates} Hz: less folds into the band of "
-                      "a faster log, which may look like a delay or slow motors; log both at one rate"
+    return of_kind + [f"{name}: logged at {hertz:.0f} Hz, the baseline at {known_rates} Hz: less folds into the band "
+                      "of a faster log, which may look like a delay or slow motors; log both at one rate"
                       for name, hertz in other_rate]
 
 
