@@ -52,11 +52,11 @@ def test_seconds_on_the_ground_with_the_motors_on_are_no_evidence(log):
     whole, resting = as_flight(log), np.flatnonzero(np.max([log[name] for name in PWM], axis=0) <= 0.0)[:50]
     first, idle = resting[-1] + 1, np.resize(resting, 300)
     columns = {k: np.insert(v, first, np.full(300, 30000.0) if k in PWM else v[idle]) for k, v in log.columns.items()}
-    waits = as_flight(FlightLog({**columns, "t_s": 0.01 * np.arange(len(log) + 300)}, log.meta))
-    in_air = waits.phase != KINDS.index("ground")
+    delayed = as_flight(FlightLog({**columns, "t_s": 0.01 * np.arange(len(log) + 300)}, log.meta))
+    in_air = delayed.phase != KINDS.index("ground")
     assert in_air[first:first + 300].sum() > 250, "by its commands it flies"
-    assert not waits.usable[first:first + 300].any()
-    np.testing.assert_array_equal(waits.usable[first + 450:], whole.usable[first + 150:])
+    assert not delayed.usable[first:first + 300].any()
+    np.testing.assert_array_equal(delayed.usable[first + 450:], whole.usable[first + 150:])
 
 
 def test_a_row_lost_in_mid_flight_is_lost_and_no_jitter(log):

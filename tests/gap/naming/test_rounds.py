@@ -65,16 +65,16 @@ def test_effect_stays_before_its_companion():
     assert best["gust"].gain > most + LEAST_GAIN
 
 
-@pytest.mark.parametrize(("over", "behind"), [(90.0, True), (110.0, False)])
-def test_a_gust_must_gain_over_drag_what_a_named_random_effect_must(over, behind):
+@pytest.mark.parametrize(("further_gain", "behind"), [(90.0, True), (110.0, False)])
+def test_a_gust_must_gain_over_drag_what_a_named_random_effect_must(further_gain, behind):
     """Drag alone gains 400 nats: a quarter is 100, far more than LEAST_GAIN."""
     on = trial(swaying(drag=0.005))
-    found = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
-    drag = replace(found["rotor_drag"], gain=400.0, full=False)
-    gust = replace(found["gust"], gain=400.0 + over, full=False)
+    hypotheses = round_of(on, candidates_of(["gust", "rotor_drag"]), None)
+    drag = replace(hypotheses["rotor_drag"], gain=400.0, full=False)
+    gust = replace(hypotheses["gust"], gain=400.0 + further_gain, full=False)
     assert len(gust.terms) == 2
     best = rounds.best_of_each(on, [gust, drag], 0)
-    assert best["gust"].gain == (400.0 - LEAST_GAIN if behind else 400.0 + over)
+    assert best["gust"].gain == (400.0 - LEAST_GAIN if behind else 400.0 + further_gain)
 
 
 def test_screened_strength_is_the_mean_of_both_halves():

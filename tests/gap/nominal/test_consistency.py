@@ -134,16 +134,16 @@ def test_a_log_of_another_kind_than_the_baselines_is_told(meta, baseline, unlike
     assert bool(notes) == unlike and all("flight 0" in n and "(usd)" in n and "(authors)" in n for n in notes)
 
 
-@pytest.mark.parametrize(("meta", "baseline", "told"), [
+@pytest.mark.parametrize(("meta", "baseline", "words"), [
     ({"resampled": {"from_hz": 199.6}}, [{}, {}], "logged at 200 Hz, the baseline at 100 Hz"),
     ({}, [{"resampled": {"from_hz": 500.0}}, {"resampled": {"from_hz": 200.0}}], "the baseline at 200, 500 Hz"),
     ({"resampled": {"from_hz": 125.1}}, [{"resampled": {"from_hz": 124.9}}], ""),
     ({"resampled": {"from_hz": 200}}, [{}], "logged at 200 Hz"),
     ({"resampled": "by hand"}, [{"resampled": {"from_hz": float("nan")}}], ""),
     ({"resampled": {"from_hz": 200.0}}, [], "")])
-def test_a_log_of_another_rate_than_the_baselines_is_told(meta, baseline, told):
+def test_a_log_of_another_rate_than_the_baselines_is_told(meta, baseline, words):
     test, *others = (flight(1.0, name=f"flight {i}") for i in range(1 + len(baseline)))
     for one, of_log in zip((test, *others), (meta, *baseline), strict=True):
         one.log.meta.update(of_log)
     notes = logged_unlike([test], others)
-    assert len(notes) == bool(told) and all("flight 0" in n and told in n for n in notes)
+    assert len(notes) == bool(words) and all("flight 0" in n and words in n for n in notes)

@@ -144,8 +144,8 @@ def logged_unlike(flights: Sequence[Flight], baseline: Sequence[Flight]) -> list
     of_kind = [f"{f.file_name}: a log of another kind ({log_kind(f.log)}) than the baseline's ({known_kinds}): what "
                "differs may be the logs; take a baseline that was logged like the test"
                for f in flights if kinds and log_kind(f.log) not in kinds]
-    logged = [(f.file_name, logged_hz(f.log)) for f in flights]
-    other_rate = [(name, hertz) for name, hertz in logged
+    rate_by_flight = [(f.file_name, logged_hz(f.log)) for f in flights]
+    other_rate = [(name, hertz) for name, hertz in rate_by_flight
                   if rates and min(abs(hertz / r - 1.0) for r in rates) > SAME_RATE]
     return of_kind + [f"{name}: logged at {hertz:.0f} Hz, the baseline at {known_rates} Hz: less folds into the band "
                       "of a faster log, which may look like a delay or slow motors; log both at one rate"
