@@ -25,11 +25,11 @@ def candidate(name, gate=()):
     return Hypothesis(name, (term,), GAINS[name], evidence=GAINS[name], full=False)
 
 
-def selection(named=("mass",), left=4.0, gate=(), by_relations=False, of_times=0.0):
+def selection(named=("mass",), left=4.0, gate=(), by_relations=False, outside_spectra=0.0):
     """A selection that names effects, beside which a nameless model or disturbance gains so many nats."""
     steps = tuple(Step.of(candidate(n, gate)) for n in named)
     inferred = Inference((), GAINS, Counterevidence(left, 30.0, of_distance=False)) if by_relations else None
-    return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, of_times), (None, None),
+    return Selection({n: candidate(n) for n in GAINS}, steps, NamelessGain(150.0, left, outside_spectra), (None, None),
                      dict.fromkeys(GAINS, 8.0), POLICY, spectrum_is_assumed=False, inference=inferred)
 
 
@@ -65,8 +65,8 @@ LIMIT = 20.0  #: nats that may be left beside a mass that gains 200
     (selection(), False, "none"),
     (selection(), True, "effect"),  # some cells are calmer than nominal flights, others less calm
     (selection(left=LIMIT + 1.0), True, "unknown"),
-    (selection(of_times=LIMIT - 1.0, left=LIMIT - 1.0), False, "none"),
-    (selection(of_times=LIMIT + 1.0, left=LIMIT + 1.0), False, "unknown")])  # odd times, which no nominal flight has
+    (selection(outside_spectra=LIMIT - 1.0, left=LIMIT - 1.0), False, "none"),
+    (selection(outside_spectra=LIMIT + 1.0, left=LIMIT + 1.0), False, "unknown")])  # as odd times
 def test_simulated_flights_at_their_floor_have_effects_that_bring_cells_nearer(monkeypatch, of, nearer, verdict):
     monkeypatch.setattr("airtouch.gap.answer.ranking.is_nearer_to_floor", lambda *_: nearer)
     assert verdict_of(SIMULATED, of, gap(AT_FLOOR)) == verdict

@@ -95,10 +95,10 @@ def test_a_withdrawn_error_of_the_times_is_left_to_the_nameless_model(study):
     """While it is named, the times hold nothing more; without its name they hold all that it gained."""
     data = Data(study, fly(1, 94, {"time_jitter": {"rms": 0.004}}))
     selection = select(data, {"time_jitter": all_candidates()["time_jitter"]}, without=tuple(PASSING))
-    assert [s.name for s in selection.named_steps] == ["time_jitter"] and selection.nameless.of_times == 0.0
+    assert [s.name for s in selection.named_steps] == ["time_jitter"] and selection.nameless.outside_spectra == 0.0
     after = with_names_withdrawn(data, selection, 0.1)
     assert not after.steps and after.withdrawn == (("time_jitter",), 0.1)
-    assert after.nameless.of_times == pytest.approx(selection.steps[0].gain)
+    assert after.nameless.outside_spectra == pytest.approx(selection.steps[0].gain)
     assert after.nameless.over_last_step == after.nameless.over_none == selection.nameless.over_none
 
 

@@ -4,6 +4,7 @@ from airtouch.gap.answer.probabilities import probabilities
 from airtouch.gap.answer.reasons import why_not
 from airtouch.gap.answer.shrink import Gap, closure_of, is_nearer_to_floor
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.sensing import sensing_gain
 from airtouch.gap.naming.policy import FIRST_GAIN
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.naming.unknown import counterevidence, is_explained, unsteadiness_ratio
@@ -37,21 +38,23 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
     """Whether something acts that a gap at its floor cannot show. Any one of four signs is enough.
 
-    1. Every effect named is an error of the logged times or passes. The times are no part of the gap. The gap is
-       measured in what both halves of the data show, and an effect that passes is seldom in both.
+    1. Every effect named is an error of the logged times, passes, or delays the answer to noise where that is another
+       one. Times and answer are no part of the gap. The gap is measured in what both halves of the data show, and an
+       effect that passes is seldom in both.
     2. In recorded flights: they are less steady than nominal ones, by more than may be chance. The gap is a mean over
        seconds in which little acts.
-    3. In simulated flights: what the logged times hold beside the effects is more than chance allows.
+    3. In simulated flights: what logged times and answer hold beside the effects is more than chance allows.
     4. In simulated flights: the effects named bring the cells nearer to the floor, be it from below. In recorded
        flights less power than the floor means calm air.
     """
     hypothesis = selection.named_hypothesis
-    if hypothesis is not None and all(t.shows_in == CLOCK or t.gate for t in hypothesis.terms):
+    if hypothesis is not None and all(t.shows_in == CLOCK or t.gate or sensing_gain(data, [t])
+                                      for t in hypothesis.terms):
         return True
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
-    irregular_times = selection.nameless.of_times > counterevidence(selection).limit
-    return irregular_times or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
+    beside_spectra = selection.nameless.outside_spectra > counterevidence(selection).limit
+    return beside_spectra or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

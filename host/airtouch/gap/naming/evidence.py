@@ -11,6 +11,9 @@ The rarity is the log likelihood of the strength over that of nominal scatter an
 bound the model stretches to fit what another effect does. A passing effect has the same rule for its size
 (`passing_effect.passing_evidence`), and the relations of signals have an evidence of their own.
 
+What an effect gains as the commands answer the gyro's noise otherwise (`evidence.sensing`) is beyond nominal flights
+already: it is no part of the minimum, and is added to it.
+
 The nominal scatter is that beyond chance. So the chance error of a strength counts beside it, a random effect's too.
 """
 
@@ -22,6 +25,7 @@ import numpy as np
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.evidence.random_strength import strength_variance
+from airtouch.gap.evidence.sensing import sensing_gain
 from airtouch.gap.naming.judging import at_bound
 from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signatures.candidates import strength_term
@@ -31,7 +35,13 @@ from airtouch.gap.signatures.term import Term
 
 def with_evidence(data: Data, best: Mapping[str, Hypothesis], base_gain: float) -> dict[str, Hypothesis]:
     """The best hypothesis of each candidate, by name, with its evidence; base_gain: nats that the base gains."""
-    return {name: replace(h, evidence=min(h.gain - base_gain, _limit(data, h))) for name, h in best.items()}
+    return {name: replace(h, evidence=_evidence(data, h, base_gain)) for name, h in best.items()}
+
+
+def _evidence(data: Data, hypothesis: Hypothesis, base_gain: float) -> float:
+    """The evidence for a hypothesis' newest effect, nats."""
+    of_answer = sensing_gain(data, [_own_term(hypothesis)])
+    return min(hypothesis.gain - base_gain - of_answer, _limit(data, hypothesis)) + of_answer
 
 
 def random_variance(data: Data, judged: Hypothesis, term: Term) -> np.ndarray:

@@ -4,6 +4,7 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
 
     gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
            + clock_gains                        log likelihood of the logged times, by effects that show there alone
+           + sensing_gain                       log likelihood of another answer to noise, by effects that delay it
            - price_of                           PRICE of each free parameter of a term beyond its first; a random part
                                                 or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
@@ -22,6 +23,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.judge import cell_gains, judge
 from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
+from airtouch.gap.evidence.sensing import sensing_gain
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.signals.spectra import AIR, REST
@@ -104,7 +106,8 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | Non
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
-        gain = _charged_gain(trial, fits, charges, clock_gains(trial.data, before))
+        gain = _charged_gain(trial, fits, charges,
+                             clock_gains(trial.data, before) + sensing_gain(trial.data, (*before, *terms)))
     of_clock = [measured_clock_term(trial.data, t).term for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
@@ -124,12 +127,12 @@ def _charges(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> C
     return before.with_effect(variant.choice_cost, uncertain_floor_loss(trial, base.fits))
 
 
-def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, of_clock: float) -> float:
-    """Nats that effects gain in the spectra after their charges, with those of effects on the clock before them.
+def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, beside: float) -> float:
+    """Nats that effects gain in the spectra after their charges, with what is no part of these.
 
-    fits: to each half; charges: of all effects; of_clock: nats of those on the clock.
+    fits: to each half; charges: of all effects; beside: nats of the logged times and of the answer to noise.
     """
-    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), of_clock)
+    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), beside)
     return held_out + (charges.uncertain_floor_loss - price_of(fits[0].terms) - charges.choice_cost)
 
 

@@ -109,13 +109,13 @@ class Step(Hypothesis):
 class NamelessGain:
     """Held-out nats that the nameless model gains; 0 where the relations of signals decide, which do not use it.
 
-    over_none: over no effect; over_last_step: over the last step of the selection; of_times: of the latter, what the
-    logged times hold.
+    over_none: over no effect; over_last_step: over the last step of the selection; outside_spectra: of the latter, what
+    logged times and answer to noise hold.
     """
 
     over_none: float = 0.0
     over_last_step: float = 0.0
-    of_times: float = 0.0
+    outside_spectra: float = 0.0
 
 
 class OverPrediction(NamedTuple):

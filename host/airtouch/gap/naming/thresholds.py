@@ -11,6 +11,7 @@ from airtouch.gap.evidence.cells import CELLS, sensor_cells
 from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN
+from airtouch.gap.evidence.sensing import sensing_gain
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import LEAST_GAIN, MISFIT_SHARE_RANDOM
 from airtouch.gap.naming.records import Hypothesis
@@ -38,12 +39,13 @@ def is_random_misfit(trial: Trial, base: Hypothesis, extended: Hypothesis) -> bo
 def misfit(trial: Trial, base: Hypothesis, extended: Hypothesis, share: float, everywhere: bool = False) -> float:
     """Nats that a further effect may gain because the models of those before it are wrong by a share of their gain.
 
-    It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects on the logged times gain does
-    not count, as these are no models. With `NamingPolicy.misfit_by_cell`, and unless `everywhere`, only the gain in
-    cells in which the further effect gains counts (`gain_in_improved_cells`). These cells are not worked out for a
-    further effect that gains more than the share of the whole.
+    It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects gain by the logged times,
+    or by the answer to noise, does not count, as these are no models. With `NamingPolicy.misfit_by_cell`, and unless
+    `everywhere`, only the gain in cells in which the further effect gains counts (`gain_in_improved_cells`). These
+    cells are not worked out for a further effect that gains more than the share of the whole.
     """
-    whole = max(LEAST_GAIN, share * (base.gain - clock_gains(trial.data, base.terms)))
+    of_no_model = clock_gains(trial.data, base.terms) + sensing_gain(trial.data, base.terms)
+    whole = max(LEAST_GAIN, share * (base.gain - of_no_model))
     fitted = extended.full and extended.fits and base.fits
     if everywhere or not trial.policy.misfit_by_cell or not fitted or extended.gain - base.gain >= whole:
         return whole

@@ -92,7 +92,8 @@ class Law:
 
     kind: of the blocks that it was measured in and holds for, QUIET or STEPPED. transfer: q, coherent: q~ (both in the
     module's equations), complex, without unit; outside: what the gap has of a torque from outside; weight: rms
-    floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz.
+    floor of quiet blocks over that of these, 1 for quiet ones; power: S_ww, (rad/s^2)^2/Hz; of_gyro: rho, the fraction
+    of the power of y that is the gyro's noise.
     """
 
     kind: int
@@ -101,6 +102,7 @@ class Law:
     outside: OutsideTorque
     weight: np.ndarray
     power: np.ndarray
+    of_gyro: np.ndarray
 
     @property
     def bounded(self) -> np.ndarray:
@@ -166,6 +168,13 @@ class Response:
             gap[with_step] = np.where(quiet[with_step, None], gap[with_step], stepped)
         out = spectra.copy()
         out[:, FIRST_BIN:, TORQUE] = gap[:, FIRST_BIN:]
+        return out
+
+    @property
+    def may_be_gyro(self) -> np.ndarray:
+        """Whether the gyro's noise may make what y and w share, bool (bins, 3); not in the bins of the means."""
+        out = self.quiet_law.of_gyro > NOISE
+        out[:FIRST_BIN] = False
         return out
 
     def weighted(self, quiet: np.ndarray, torque: np.ndarray) -> np.ndarray:
@@ -243,7 +252,7 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
     outside = OutsideTorque(loop.measured - answer, loop.power_beyond(coherent))
-    return Law(kind, transfer, coherent, outside, weight, _smooth(power)), own_floor
+    return Law(kind, transfer, coherent, outside, weight, _smooth(power), of_gyro), own_floor
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

@@ -53,6 +53,7 @@ class Signature:
 
     Where it shows:
     shows_in: MEAN (a known force, delay or gain), SPECTRUM (a random one) or CLOCK (the logged times alone).
+    delays_sensing: whether the controllers see later what the sensors measure, so that noise is answered later too.
     commands_only: whether it changes what the controller commands and nothing of what the logged commands lead to.
     at_edges: whether it shows in what a flight does at edges.
     near_surfaces: whether it acts near surfaces alone, so that a flight high above them shows nothing of it.
@@ -79,6 +80,7 @@ class Signature:
     alone_too: bool = False
     factors: bool = False
     own_scatter: float = 0.0
+    delays_sensing: bool = False
     commands_only: bool = False
     at_edges: bool = False
     near_surfaces: bool = False
@@ -169,7 +171,7 @@ SIGNATURES: dict[str, Signature] = {
     "imu_noise": Signature(("factor",), SPECTRUM, factors=True, spectrum=IMU_NOISE),
     # lines of four rotors at nearly one speed add up as their phases happen to stand: Rayleigh, sqrt(4 / pi - 1)
     "vibration": Signature(("amplitude",), SPECTRUM, own_scatter=0.52, spectrum=ROTOR_LINES),
-    "sensor_latency": Signature(("delay",), commands_only=True),
+    "sensor_latency": Signature(("delay",), commands_only=True, delays_sensing=True),
     "actuator_delay": Signature(("delay",)),
     "time_jitter": Signature(("rms",), CLOCK),
     "packet_loss": Signature(("share",), CLOCK, loss_runs=LossRuns("share", "burst")),

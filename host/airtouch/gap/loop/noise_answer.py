@@ -1,0 +1,143 @@
+"""How the commands answer the gyro's fast noise: by how much, and how late.
+
+Above FAST_HZ a vehicle hardly turns. What its gyro shows there is noise, and the controllers answer it as if it were
+rotation. So of roll, pitch and yaw, in rows of the log, and with both signals high-passed and of rms 1,
+
+    command(t) = sum over k of c_k rate(t - k rows) + other noise,    k = 0 .. LAGS - 1
+
+by least squares: an autoregression with an exogenous input of one block (Ljung, System Identification, 2nd ed. 1999,
+chapter 4). The coefficients c, the *answer*, belong to the control loop and to how it is logged; mass, motors and air
+do not change them. Sensors that are late do: noise that the controllers see later than the log has it is answered in
+another row, or in none where the loop runs faster than the log.
+
+**How sure.** The c of a flight differ from those of nominal flights by chance, with the covariance G^-1 / n of white
+noise (G: correlations of the rate, n: independent samples), and by as much more as nominal flights differ among each
+other. So with m nominal flights they follow Student's law of 9 (m - 1) degrees of freedom, for each of the LAGS
+coefficients of three axes. Another answer is anywhere: each coefficient normal, of mean 0 and standard deviation
+ANYWHERE. `changed_nats` is the log likelihood of this over that.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import lgamma
+
+import numpy as np
+
+from airtouch.gap.flights.filters import both_ways, highpass
+from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
+from airtouch.gap.loop.command_spectra import PADDING, commands
+from airtouch.vehicle import Vehicle
+
+FAST_HZ = 20.0  #: above it the gyro shows noise rather than turns; chosen
+LAGS = 3  #: rows, from the command's own on, in which it may answer; chosen: a loop that is 20 ms late hardly flies
+MARGIN_S = 0.2  #: next to what is no evidence that is left out as well, as the filter spreads it; chosen
+LEAST_SAMPLES = 200  #: that a flight needs, 2 s; chosen
+ANYWHERE = 0.5  #: standard deviation of a coefficient of an unknown answer; chosen: of rms 1 it is 1 at most
+#: factor by which the rms of the fast rates may differ from that of nominal flights for the axis to count; chosen. What
+#: else shakes the vehicle or its gyro, the commands need not answer alike
+ALIKE = 1.3
+RIDGE = 1e-3  #: added to the correlations of the rate, so that a pure tone does no harm; chosen
+INDEPENDENT = 1.0 - 2.0 * PERIOD_S * FAST_HZ  #: of the samples of white noise, those that the high-pass leaves
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer of one flight, or the mean of several.
+
+    coefficients (3, LAGS): c of roll, pitch and yaw; correlations (3, LAGS, LAGS): G; rms_radps (3,): of the fast
+    rates; samples: n, independent ones.
+    """
+
+    coefficients: np.ndarray
+    correlations: np.ndarray
+    rms_radps: np.ndarray
+    samples: float
+
+
+@dataclass(frozen=True)
+class NominalAnswer:
+    """The answer of nominal flights: their mean, and how they differ.
+
+    excess: their variance over that of chance, 1 at least; freedom: degrees of freedom that it is known with.
+    """
+
+    mean: Answer
+    excess: float
+    freedom: float
+
+
+def answer_of(flight: Flight, vehicle: Vehicle) -> Answer | None:
+    """The answer of a flight; None without a gyro, for less than LEAST_SAMPLES in the air, and without any noise."""
+    return flight.workspace.cached("noise answer", vehicle, lambda: None if flight.rates is None else answer_in(
+        flight.rates, commands(flight, vehicle)[:, 1:], (flight.phase != GROUND) & flight.usable))
+
+
+def answer_in(rates: np.ndarray, turning: np.ndarray, counts: np.ndarray) -> Answer | None:
+    """The answer of commands to rates, or None as for `answer_of`.
+
+    rates (n, 3), rad/s, and turning (n, 3): the commands of roll, pitch and yaw, in any unit; counts (n,): samples that
+    are evidence, bool.
+    """
+    margin = round(MARGIN_S / PERIOD_S)
+    spread = np.convolve(~counts, np.ones(2 * margin + 1), "same")[:len(counts)]
+    rows = np.flatnonzero(counts & (spread < 0.5))
+    rows = rows[rows >= LAGS]
+    if len(rows) < LEAST_SAMPLES:
+        return None
+    section, pad = highpass(FAST_HZ * 2.0 * PERIOD_S), min(PADDING, len(rates) - 2)
+    fast_rates, fast_commands = both_ways(section, rates, pad), both_ways(section, turning, pad)
+    coefficients, correlations, rms = np.zeros((3, LAGS)), np.zeros((3, LAGS, LAGS)), np.zeros(3)
+    for axis in range(3):
+        before = np.stack([fast_rates[rows - k, axis] for k in range(LAGS)], axis=1)
+        command = fast_commands[rows, axis]
+        rms[axis], scale = np.sqrt(np.mean(before[:, 0] ** 2)), np.sqrt(np.mean(command ** 2))
+        if not rms[axis] or not scale:
+            return None
+        correlations[axis] = before.T @ before / (len(rows) * rms[axis] ** 2) + RIDGE * np.eye(LAGS)
+        coefficients[axis] = np.linalg.solve(correlations[axis], before.T @ command / (len(rows) * rms[axis] * scale))
+    return Answer(coefficients, correlations, rms, INDEPENDENT * len(rows))
+
+
+def mean_answer(answers: Sequence[Answer]) -> Answer:
+    """The mean of the answers of one or more flights, with the samples of all."""
+    return Answer(np.mean([a.coefficients for a in answers], axis=0),
+                  np.mean([a.correlations for a in answers], axis=0),
+                  np.mean([a.rms_radps for a in answers], axis=0), sum(a.samples for a in answers))
+
+
+def nominal_answer(flights: Sequence[Flight], vehicle: Vehicle) -> NominalAnswer | None:
+    """The answer of flights declared nominal; None where fewer than two of them have one."""
+    answers = [a for a in (answer_of(f, vehicle) for f in flights) if a is not None]
+    if len(answers) < 2:
+        return None
+    mean = mean_answer(answers)
+    freedom = mean.coefficients.size * (len(answers) - 1)
+    off = [a.coefficients - mean.coefficients for a in answers]
+    squares = sum(a.samples * float(np.einsum("ai,aij,aj", d, mean.correlations, d))
+                  for a, d in zip(answers, off, strict=True))
+    return NominalAnswer(mean, max(squares / freedom, 1.0), float(freedom))
+
+
+def changed_nats(nominal: NominalAnswer, answers: Sequence[Answer]) -> float:
+    """Log likelihood, nats, of another answer than that of nominal flights over theirs; 0 where no axis counts.
+
+    answers: of flights with the same vehicle, one or more.
+    """
+    ours, theirs = mean_answer(answers), nominal.mean
+    alike = np.abs(np.log(ours.rms_radps / theirs.rms_radps)) < np.log(ALIKE)
+    size = LAGS * int(alike.sum())
+    if not size:
+        return 0.0
+    chance = np.zeros((size, size))
+    for place, axis in enumerate(np.flatnonzero(alike)):
+        part = slice(LAGS * place, LAGS * (place + 1))
+        chance[part, part] = np.linalg.inv(theirs.correlations[axis])
+    chance *= nominal.excess * (1.0 / ours.samples + 1.0 / theirs.samples)
+    c, expected = ours.coefficients[alike].ravel(), theirs.coefficients[alike].ravel()
+    freedom = nominal.freedom
+    squared = float((c - expected) @ np.linalg.solve(chance, c - expected))
+    as_nominal = (lgamma(0.5 * (freedom + size)) - lgamma(0.5 * freedom) - 0.5 * size * np.log(0.5 * freedom)
+                  - 0.5 * np.linalg.slogdet(chance)[1] - 0.5 * (freedom + size) * np.log1p(squared / freedom))
+    wide = chance + ANYWHERE ** 2 * np.eye(size)
+    anywhere = -0.5 * np.linalg.slogdet(wide)[1] - 0.5 * float(c @ np.linalg.solve(wide, c))
+    return float(anywhere - as_nominal)
