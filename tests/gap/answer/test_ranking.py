@@ -51,6 +51,12 @@ def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
     assert verdict_of(RECORDED, of, gap(before)) == verdict
 
 
+@pytest.mark.parametrize(("nats", "verdict"), [(20.0, "effect"), (0.0, "none")])
+def test_late_sensors_act_though_the_gap_is_at_its_floor_where_noise_is_answered_otherwise(monkeypatch, nats, verdict):
+    monkeypatch.setattr("airtouch.gap.answer.ranking.sensing_gain", lambda *_: nats)
+    assert verdict_of(RECORDED, selection(), gap(AT_FLOOR)) == verdict
+
+
 @pytest.mark.parametrize(("named", "nats", "verdict"), [
     ((), 12.0, "unknown"), ((), 7.0, "none"), (("mass",), 12.0, "none")])
 def test_what_shakes_for_some_seconds_acts_though_the_gap_is_at_its_floor(named, nats, verdict):

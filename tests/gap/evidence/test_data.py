@@ -34,7 +34,8 @@ def flown():
 
 
 def law(kind, weight):
-    return Law(kind, COMMANDED * ONES, COMMANDED * ONES, OutsideTorque(OUTSIDE * ONES, ONES), weight * ONES, ONES)
+    return Law(kind, COMMANDED * ONES, COMMANDED * ONES, OutsideTorque(OUTSIDE * ONES, ONES), weight * ONES, ONES,
+               0.0 * ONES)
 
 
 def with_response(quiet, stepped_law=True, change=None):

@@ -1,14 +1,16 @@
 """Blocks flattened: what is known of each value, and what an offset of one flight adds, against data made with it."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.flattened import OFFSETS, Offset
+from airtouch.gap.evidence.flattened import OFFSETS, Offset, _counted
 from airtouch.gap.evidence.problem import problem_of, whole_of
-from airtouch.gap.signals.channels import CHANNELS, COUNT
+from airtouch.gap.signals.channels import CHANNELS, COUNT, TORQUE
+from airtouch.gap.signals.response import FIRST_BIN
 from airtouch.gap.signals.spectra import AIR, REST, frequencies
 from hovers import FLOOR, hover
 
@@ -80,3 +82,18 @@ def test_blocks_in_the_air_are_those_that_fit_into_its_seconds(two):
     assert air.flight.tolist() == [0] * 6 + [1] * 6
     values, = {int(n) for n in np.bincount(air.block_of_value[air.block_of_value >= 0])}
     assert values == (len(frequencies(AIR)) * 3 + 2 * 3 + 2), "all bins of force; torque's means; roll and pitch rate's"
+
+
+@pytest.mark.parametrize(("nats", "same_models", "torque_counts"), [
+    (0.0, False, True), (20.0, True, True), (20.0, False, False)])
+def test_torque_that_the_gyro_may_make_does_not_count_where_its_noise_is_answered_otherwise(
+        monkeypatch, nats, same_models, torque_counts):
+    """Here the gyro may make all torque above the means; force and means count in any case."""
+    above_means = np.zeros((len(frequencies(AIR)), 3), bool)
+    above_means[FIRST_BIN:] = True
+    response = SimpleNamespace(may_be_gyro=above_means)
+    data = SimpleNamespace(means_only=False, study=SimpleNamespace(response=response, same_models=same_models))
+    monkeypatch.setattr("airtouch.gap.evidence.flattened.changed_answer_nats", lambda _: nats)
+    keep = _counted(data)[AIR]
+    assert keep[FIRST_BIN:, TORQUE].any() == torque_counts
+    assert keep[0, TORQUE].all() and keep[FIRST_BIN:, :TORQUE.start].any()

@@ -1,5 +1,7 @@
 """How the gyro follows logged commands: against the closed forms of errors in variables, and made laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from airtouch.gap.signals.quiet_blocks import QuietPower
 from airtouch.gap.signals.response import (
     CUT_DOUBT,
     FIRST_BIN,
+    NOISE,
     Law,
     OutsideTorque,
     Response,
@@ -155,7 +158,7 @@ def law(kind=QUIET, coherent=0.5, weight=1.0, remains=0.5 + 0.5j, power=2.0):
         return np.full((BINS, 3), x)
 
     return Law(kind, table(coherent), table(coherent), OutsideTorque(table(remains), table(power)), table(weight),
-               table(1.0))
+               table(1.0), table(0.0))
 
 
 def response(stepped=True):
@@ -234,3 +237,12 @@ def test_power_of_a_random_torque_stays_where_no_law_is_known():
     power = response(stepped=False).random_power(SOME_QUIET, sensed=False)
     above = power[:, FIRST_BIN:, 0]
     np.testing.assert_allclose(above, np.where(SOME_QUIET[:, :1], 3.0, 1.0) * np.ones(above.shape))
+
+
+def test_noise_may_make_the_torque_where_it_is_a_part_of_its_power_above_the_means():
+    share = np.full((BINS, 3), NOISE - 0.01)
+    share[:, 2] = NOISE + 0.01
+    expected = np.zeros((BINS, 3), bool)
+    expected[FIRST_BIN:, 2] = True
+    of = response()
+    assert (replace(of, quiet_law=replace(of.quiet_law, of_gyro=share)).may_be_gyro == expected).all()
