@@ -6,7 +6,13 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.answer.named_effects import with_random_part
-from airtouch.gap.answer.notes import at_end_of_range, cannot_be_replayed, mostly_random, signs_not_shown
+from airtouch.gap.answer.notes import (
+    at_end_of_range,
+    cannot_be_replayed,
+    mostly_random,
+    noise_answered_otherwise,
+    signs_not_shown,
+)
 from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.candidates import random_part_of
 
@@ -53,3 +59,10 @@ def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
     (note,) = signs_not_shown(selection)
     assert note.startswith("mass: ")
     assert signs_not_shown(SimpleNamespace(inference=None)) == []
+
+
+@pytest.mark.parametrize("nats", [0.0, 17.4])
+def test_an_answer_to_noise_that_is_another_one_has_a_note(monkeypatch, nats):
+    monkeypatch.setattr("airtouch.gap.answer.notes.changed_answer_nats", lambda _: nats)
+    notes = noise_answered_otherwise("some flights")
+    assert len(notes) == bool(nats) and all("(17 nats)" in note for note in notes)

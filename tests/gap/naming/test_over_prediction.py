@@ -15,7 +15,7 @@ from airtouch.gap.naming.over_prediction import over_prediction_by_channel, over
 from airtouch.gap.naming.policy import policy_of
 from airtouch.gap.naming.records import OverPrediction
 from airtouch.gap.naming.unknown import against_over_limit, is_explained
-from airtouch.gap.signals.channels import COUNT
+from airtouch.gap.signals.channels import CHANNELS, COUNT
 from airtouch.gap.signals.spectra import REST
 from hovers import DOWN, hover, scattered, select_from
 
@@ -60,7 +60,22 @@ def test_loss_by_channel():
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
     gains[at_rest + forward] = -8.0
+    sideways, roll = 1, 3
+    gains[[sideways, roll + COUNT]] = -50.0, -4.0  # nothing gains in force x or torque y
     loss = over_prediction_by_channel(gains)
+    assert loss[sideways] == 49.0 and loss[roll] == 3.0
     assert loss[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
     assert loss[forward] == pytest.approx(0.0 + 4.0 + 2.0) and loss[at_rest + forward] == pytest.approx(7.0)
-    assert np.count_nonzero(loss) == 3
+    assert np.count_nonzero(loss) == 5
+
+
+@pytest.mark.parametrize(("explained", "wrong"), [
+    ("force_x", "force_y"), ("torque_y", "torque_x"), ("command_roll", "command_pitch")])
+def test_what_is_explained_along_one_horizontal_axis_may_be_wrong_along_the_other(explained, wrong):
+    """A push of 1 along x, taken to come 6 degrees from the side, is 0.1 along y that is not there."""
+    names = [c.name for c in CHANNELS]
+    gains = np.zeros(CELLS)
+    gains[names.index(explained)], gains[names.index(wrong)] = 400.0, -45.0
+    gains[names.index("force_z")], gains[names.index("command_yaw")] = 900.0, -7.0
+    lost = {names[i]: lost for i, lost in enumerate(over_prediction_by_channel(gains)[:COUNT]) if lost}
+    assert lost == {"command_yaw": 6.0}

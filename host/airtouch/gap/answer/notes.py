@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 
 from airtouch.gap.answer.reasons import only_in_relations
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.sensing import changed_answer_nats
+from airtouch.gap.loop.noise_answer import FAST_HZ
 from airtouch.gap.naming.judging import NEAR_BOUND, at_bound
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import NamedEffect
@@ -53,3 +56,10 @@ def signs_not_shown(selection: Selection) -> list[str]:
     names = {s.name for s in selection.named_steps}
     return [f"{name}: the flights do not show the sign of its strength; it may be the other one"
             for name in selection.inference.without_sign if name in names]
+
+
+def noise_answered_otherwise(data: Data) -> list[str]:
+    """A note where the commands answer the gyro's noise otherwise than in nominal flights (`loop.noise_answer`)."""
+    nats = changed_answer_nats(data)
+    return [f"the commands answer the gyro's noise above {FAST_HZ:g} Hz otherwise than in the baseline flights"
+            f" ({nats:.0f} nats): the controllers see later, or the log is timed otherwise"] if nats else []

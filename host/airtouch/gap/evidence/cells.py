@@ -6,8 +6,8 @@ view: REPLAY_VIEW, REST_VIEW or COMMAND_VIEW; channel: its index in `channels.CH
 its index in `blocks.BANDS_HZ`, counted from 0, but from 1 in the command view (COMMAND_FIRST_BAND). So band 0 is the
 one with the means, which the command view does not have.
 
-`channel_cells`, `sensor_cells` and `band_cells` make groups of cells: they give each cell the number of the first cell
-of its group.
+`channel_cells`, `heading_cells`, `sensor_cells` and `band_cells` make groups of cells: they give each cell the number
+of the first cell of its group.
 """
 
 from typing import NamedTuple
@@ -24,6 +24,8 @@ CELLS = 3 * VIEW_STRIDE  #: numbers of cells are below it
 COMMAND_FIRST_BAND = 1  #: number of the lowest band in the command view
 NYQUIST_HZ = 0.5 / PERIOD_S  #: end of the highest band
 SENSOR_AXES = 3  #: channels of one sensor (x, y and z), which follow one another in `channels.CHANNELS`
+#: for each channel the index of the first that a turn about the vertical mixes with it: y and pitch follow x and roll
+_FIRST_OF_TURN = np.array([i - c.name.endswith(("_y", "_pitch")) for i, c in enumerate(CHANNELS)])
 
 
 class CellIndices(NamedTuple):
@@ -66,6 +68,16 @@ def sensor_cells() -> np.ndarray:
     """
     view, band, channel = cell_indices(np.arange(CELLS))
     return cell_numbers(view, band, channel - channel % SENSOR_AXES)
+
+
+def heading_cells() -> np.ndarray:
+    """For each cell (CELLS,) the number of the first cell of its view and of the channels that a turn mixes.
+
+    A turn about the vertical mixes x and y of a sensor, and the commands of roll and pitch; any other channel stands
+    alone. All bands together.
+    """
+    view, _, channel = cell_indices(np.arange(CELLS))
+    return cell_numbers(view, np.zeros_like(channel), _FIRST_OF_TURN[channel])
 
 
 def band_cells() -> np.ndarray:

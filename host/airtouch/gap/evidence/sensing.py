@@ -6,9 +6,9 @@ timed. Where the answer is another one, the noise in the measured torque no long
 flights. So those values of the torque that this noise may make count no longer, unless the loop is the firmware's, of
 which a model says how they change (`flattened`).
 
-In recorded flights the answer says nothing. What shakes a real vehicle above half of the log's rate folds into the
-answer and differs from flight to flight: of 171 nominal flights, each against others of its day, 2 gain over 8 nats
-(host/docs/looks.md, 2026-11-28 08:50). In simulated flights none does.
+In recorded flights the answer does not count. It differs from one nominal flight to the next by 3 to 20 times the
+variance of chance, in simulated ones by that of chance alone. Two of 177 recorded nominal flights would have another
+answer than others of their day (host/docs/looks.md, 2026-11-28 08:50).
 """
 
 from collections.abc import Sequence

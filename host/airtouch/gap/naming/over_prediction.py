@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from airtouch.gap.evidence.cells import CELLS, channel_cells
+from airtouch.gap.evidence.cells import CELLS, channel_cells, heading_cells
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import CHANCE_LOSS, UNKNOWN_ASSUMED
 from airtouch.gap.naming.records import Hypothesis, OverPrediction
@@ -30,9 +30,10 @@ def over_prediction_by_channel(gains: np.ndarray) -> np.ndarray:
     gains (CELLS,): nats that a hypothesis gains in each cell, over none. Where it is right, the likelihood ratio of
     none over it has the mean 1 in every cell, so that a loss beyond x nats has a chance of at most exp(-x) (Markov). So
     CHANCE_LOSS nats of a cell's loss do not count. In a channel that a hypothesis explains, its detail may be wrong by
-    a share UNKNOWN_ASSUMED of what it gains there.
+    a share UNKNOWN_ASSUMED of what it gains there. So it may be in the channel beside it, x or y, roll or pitch: the
+    direction of the path or of an edge is known to some degrees, and an error turns the effect from one into the other.
     """
-    channel = channel_cells()
+    channel, mixed = channel_cells(), heading_cells()
     lost = np.bincount(channel, np.maximum(-gains - CHANCE_LOSS, 0.0), CELLS)
-    gained = np.bincount(channel, np.maximum(gains, 0.0), CELLS)
+    gained = np.bincount(mixed, np.maximum(gains, 0.0), CELLS)[mixed]
     return np.maximum(lost - UNKNOWN_ASSUMED * gained, 0.0)
