@@ -15,7 +15,7 @@ from airtouch.gap.answer.notes import (
     at_end_of_range,
     cannot_be_replayed,
     mostly_random,
-    noise_answered_otherwise,
+    noise_echoed_otherwise,
     signs_not_shown,
 )
 from airtouch.gap.answer.ranking import alike_of, ranking_of, verdict_of
@@ -120,7 +120,7 @@ def diagnose(flights: Sequence[FlightLog], vehicle: Vehicle, baseline: Sequence[
     comparison = Comparison(vehicle, usable, nominal, flights_to_judge(usable), study, calibration)
     data = _data(study, comparison.judged)
     selection, gap = selection_and_gap(data, without, say)
-    notes += signs_not_shown(selection) + noise_answered_otherwise(data)
+    notes += signs_not_shown(selection) + noise_echoed_otherwise(data)
     say("how far")
     result = _answer(data, selection, gap)
     notes += at_end_of_range(result.effects) + mostly_random(result.effects)

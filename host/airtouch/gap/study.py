@@ -8,7 +8,7 @@ import numpy as np
 
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop.closed_loop import ClosedLoop
-from airtouch.gap.loop.noise_answer import NominalAnswer
+from airtouch.gap.loop.noise_echo import NominalEcho
 from airtouch.gap.signals.channels import residual
 from airtouch.gap.signals.floor import Floor
 from airtouch.gap.signals.response import Response
@@ -35,7 +35,7 @@ class Study:
       flights it is the declared noise of the sensors.
     - response: how the gyro follows the commands of nominal flights. None: no loop, a flight without a gyro, or too
       few blocks; then torque counts in the mean alone.
-    - answer: how the commands of nominal flights answer the noise of the gyro. None: fewer than two flights with one.
+    - echo: that of the gyro's noise in the commands of nominal flights. None: fewer than two flights with one.
     - nominal_count: number of nominal flights; 0 without a baseline.
 
     `nominal.calibrate`, once the vehicle is fitted; a study of a vehicle as declared has none of these:
@@ -57,7 +57,7 @@ class Study:
     loop: ClosedLoop | None
     floor: Floor
     response: Response | None = None
-    answer: NominalAnswer | None = None
+    echo: NominalEcho | None = None
     nameless_floor: "NamelessFloor | None" = None
     nominal_count: int = 0
     scatter: Scatter | None = None

@@ -10,7 +10,7 @@ from airtouch.gap.answer.notes import (
     at_end_of_range,
     cannot_be_replayed,
     mostly_random,
-    noise_answered_otherwise,
+    noise_echoed_otherwise,
     signs_not_shown,
 )
 from airtouch.gap.result import NamedEffect, Quantity
@@ -62,7 +62,7 @@ def test_a_sign_that_does_not_show_is_noted_of_named_effects_alone():
 
 
 @pytest.mark.parametrize("nats", [0.0, 17.4])
-def test_an_answer_to_noise_that_is_another_one_has_a_note(monkeypatch, nats):
-    monkeypatch.setattr("airtouch.gap.answer.notes.changed_answer_nats", lambda _: nats)
-    notes = noise_answered_otherwise("some flights")
+def test_an_echo_of_noise_that_is_another_one_has_a_note(monkeypatch, nats):
+    monkeypatch.setattr("airtouch.gap.answer.notes.changed_echo_nats", lambda _: nats)
+    notes = noise_echoed_otherwise("some flights")
     assert len(notes) == bool(nats) and all("(17 nats)" in note for note in notes)

@@ -52,7 +52,7 @@ def test_verdict_is_that_of_the_first_rule_that_holds(of, before, verdict):
 
 
 @pytest.mark.parametrize(("nats", "verdict"), [(20.0, "effect"), (0.0, "none")])
-def test_late_sensors_act_though_the_gap_is_at_its_floor_where_noise_is_answered_otherwise(monkeypatch, nats, verdict):
+def test_late_sensors_act_though_the_gap_is_at_its_floor_where_noise_has_another_echo(monkeypatch, nats, verdict):
     monkeypatch.setattr("airtouch.gap.answer.ranking.sensing_gain", lambda *_: nats)
     assert verdict_of(RECORDED, selection(), gap(AT_FLOOR)) == verdict
 

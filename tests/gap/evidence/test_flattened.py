@@ -86,14 +86,14 @@ def test_blocks_in_the_air_are_those_that_fit_into_its_seconds(two):
 
 @pytest.mark.parametrize(("nats", "same_models", "torque_counts"), [
     (0.0, False, True), (20.0, True, True), (20.0, False, False)])
-def test_torque_that_the_gyro_may_make_does_not_count_where_its_noise_is_answered_otherwise(
+def test_torque_that_the_gyro_may_make_does_not_count_where_its_noise_has_another_echo(
         monkeypatch, nats, same_models, torque_counts):
     """Here the gyro may make all torque above the means; force and means count in any case."""
     above_means = np.zeros((len(frequencies(AIR)), 3), bool)
     above_means[FIRST_BIN:] = True
     response = SimpleNamespace(may_be_gyro=above_means)
     data = SimpleNamespace(means_only=False, study=SimpleNamespace(response=response, same_models=same_models))
-    monkeypatch.setattr("airtouch.gap.evidence.flattened.changed_answer_nats", lambda _: nats)
+    monkeypatch.setattr("airtouch.gap.evidence.flattened.changed_echo_nats", lambda _: nats)
     keep = _counted(data)[AIR]
     assert keep[FIRST_BIN:, TORQUE].any() == torque_counts
     assert keep[0, TORQUE].all() and keep[FIRST_BIN:, :TORQUE.start].any()

@@ -6,7 +6,7 @@ variance (`Term.quantities`), which is the sum of
 1. that of the fit: the likelihood's curvature;
 2. the square of half the difference of the two halves of the data: what one half shows and the other does not;
 3. the square of the model's error, a fraction of the parameter (`model_error`);
-4. where an effect that delays what the controllers see gains by the answer to noise: that of a row of the log
+4. where an effect that delays what the controllers see gains by the echo of noise: that of a row of the log
    (`ROW_VARIANCE_S2`).
 
 An effect that shows in the logged times alone has the variance of their chance instead (`from_times`).
@@ -44,7 +44,7 @@ SPECTRUM_ERROR = 0.1
 #: fraction of a parameter by which the loop's model may be wrong: replayed inertia and late sensors lay 27 and 29 %
 #: off, the median of nine flights of two opened sealed sets
 LOOP_ERROR = 0.25
-#: variance, s^2, of a delay of which the answer to noise says that it is there: it may be any within a row of the log.
+#: variance, s^2, of a delay of which the echo of noise says that it is there: it may be any within a row of the log.
 #: In seven simulated flights, of another loop and of a scene without relations, the spectra alone were up to 4 ms off
 ROW_VARIANCE_S2 = PERIOD_S ** 2 / 12.0
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from airtouch.gap.answer.reasons import only_in_relations
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.sensing import changed_answer_nats
-from airtouch.gap.loop.noise_answer import FAST_HZ
+from airtouch.gap.evidence.sensing import changed_echo_nats
+from airtouch.gap.loop.noise_echo import FAST_HZ
 from airtouch.gap.naming.judging import NEAR_BOUND, at_bound
 from airtouch.gap.naming.records import Selection
 from airtouch.gap.result import NamedEffect
@@ -58,8 +58,8 @@ def signs_not_shown(selection: Selection) -> list[str]:
             for name in selection.inference.without_sign if name in names]
 
 
-def noise_answered_otherwise(data: Data) -> list[str]:
-    """A note where the commands answer the gyro's noise otherwise than in nominal flights (`loop.noise_answer`)."""
-    nats = changed_answer_nats(data)
-    return [f"the commands answer the gyro's noise above {FAST_HZ:g} Hz otherwise than in the baseline flights"
-            f" ({nats:.0f} nats): the controllers see later, or the log is timed otherwise"] if nats else []
+def noise_echoed_otherwise(data: Data) -> list[str]:
+    """A note where the gyro's noise has another echo in the commands than in nominal flights (`loop.noise_echo`)."""
+    nats = changed_echo_nats(data)
+    return [f"the echo of the gyro's noise above {FAST_HZ:g} Hz in the commands is another one than in the baseline"
+            f" flights ({nats:.0f} nats): the controllers see later, or the log is timed otherwise"] if nats else []

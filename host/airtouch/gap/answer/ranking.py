@@ -38,12 +38,12 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
     """Whether something acts that a gap at its floor cannot show. Any one of four signs is enough.
 
-    1. Every effect named is an error of the logged times, passes, or delays the answer to noise where that is another
-       one. Times and answer are no part of the gap. The gap is measured in what both halves of the data show, and an
+    1. Every effect named is an error of the logged times, passes, or delays the echo of noise where that is another
+       one. Times and echo are no part of the gap. The gap is measured in what both halves of the data show, and an
        effect that passes is seldom in both.
     2. In recorded flights: they are less steady than nominal ones, by more than may be chance. The gap is a mean over
        seconds in which little acts.
-    3. In simulated flights: what logged times and answer hold beside the effects is more than chance allows.
+    3. In simulated flights: what logged times and echo hold beside the effects is more than chance allows.
     4. In simulated flights: the effects named bring the cells nearer to the floor, be it from below. In recorded
        flights less power than the floor means calm air.
     """

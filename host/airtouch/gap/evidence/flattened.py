@@ -11,7 +11,7 @@ from airtouch.gap.evidence.cells import COMMAND_FIRST_BAND, COMMAND_VIEW, REPLAY
 from airtouch.gap.evidence.data import Data, Spectra
 from airtouch.gap.evidence.layout import AirBlocks, Layout, Piece
 from airtouch.gap.evidence.likelihood import REPLAY_FREEDOM, Likelihood, tail_scale
-from airtouch.gap.evidence.sensing import changed_answer_nats
+from airtouch.gap.evidence.sensing import changed_echo_nats
 from airtouch.gap.flights.blocks import BANDS_HZ
 from airtouch.gap.signals.channels import COMMAND, COUNT, TORQUE
 from airtouch.gap.signals.command_view import CommandElements, CommandView, view_of
@@ -131,15 +131,15 @@ def flattened(data: Data, pieces: Sequence[Piece]) -> Flattened:
 def _counted(data: Data) -> dict[str, np.ndarray]:
     """Whether each bin of each channel (bins, COUNT) of the replay view counts, by state.
 
-    Torque counts in its means alone where `Data.means_only`. If the commands answer the gyro's noise otherwise than in
-    nominal flights, and no model says how, it does not count where that noise may make it.
+    Torque counts in its means alone where `Data.means_only`. If the gyro's noise has another echo in the commands
+    than in nominal flights, and no model says how, it does not count where that noise may make it.
     """
     keep = {state: judged_bins(state) for state in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
     if data.means_only or data.study.response is None:
         keep[AIR][FIRST_BIN:, TORQUE] = False
-    elif changed_answer_nats(data) and not data.study.same_models:
+    elif changed_echo_nats(data) and not data.study.same_models:
         keep[AIR][:, TORQUE] &= ~data.study.response.may_be_gyro
     return keep
 

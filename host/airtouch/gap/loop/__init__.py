@@ -29,6 +29,9 @@ of the highest Whittle likelihood of the measured S_uu (`command_spectra`). `clo
   torque from outside leaves: S in the gyro, and the command that answers it (`disturbed`); both are compared in
   `signals.response`.
 
+**The echo of noise** (`noise_echo`). In which row of the log, and how strong, the commands hold what the gyro shows
+above 20 Hz. It needs no model of the controller, so it holds for any.
+
 Sources: loops and sensitivity, Astrom and Murray, Feedback Systems, 2nd ed. 2021, chapter 12; sampling and hold,
 Franklin, Powell, Workman, Digital Control of Dynamic Systems, 3rd ed. 1998; cross spectra, Bendat and Piersol, Random
 Data, 4th ed. 2010, chapter 6; the controller, crazyflie-firmware (`simulation.firmware`).

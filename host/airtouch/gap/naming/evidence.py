@@ -11,8 +11,8 @@ The rarity is the log likelihood of the strength over that of nominal scatter an
 bound the model stretches to fit what another effect does. A passing effect has the same rule for its size
 (`passing_effect.passing_evidence`), and the relations of signals have an evidence of their own.
 
-What an effect gains as the commands answer the gyro's noise otherwise (`evidence.sensing`) is beyond nominal flights
-already: it is no part of the minimum, and is added to it.
+What an effect gains by another echo of the gyro's noise (`evidence.sensing`) is beyond nominal flights already. So it
+is no part of the minimum, and is added to it.
 
 The nominal scatter is that beyond chance. So the chance error of a strength counts beside it, a random effect's too.
 """
@@ -40,8 +40,8 @@ def with_evidence(data: Data, best: Mapping[str, Hypothesis], base_gain: float) 
 
 def _evidence(data: Data, hypothesis: Hypothesis, base_gain: float) -> float:
     """The evidence for a hypothesis' newest effect, nats."""
-    of_answer = sensing_gain(data, [_own_term(hypothesis)])
-    return min(hypothesis.gain - base_gain - of_answer, _limit(data, hypothesis)) + of_answer
+    of_echo = sensing_gain(data, [_own_term(hypothesis)])
+    return min(hypothesis.gain - base_gain - of_echo, _limit(data, hypothesis)) + of_echo
 
 
 def random_variance(data: Data, judged: Hypothesis, term: Term) -> np.ndarray:

@@ -4,7 +4,7 @@ Of a few flights each half has some blocks of every flight. A hypothesis gains, 
 
     gain = gain_of(half 0) + gain_of(half 1)    held-out log likelihood of the spectra, each half by the other's fit
            + clock_gains                        log likelihood of the logged times, by effects that show there alone
-           + sensing_gain                       log likelihood of another answer to noise, by effects that delay it
+           + sensing_gain                       log likelihood of another echo of noise, by effects that delay it
            - price_of                           PRICE of each free parameter of a term beyond its first; a random part
                                                 or a companion pays LONGER_GAIN instead (`rounds`)
            - choice_cost                        log n for the choice among the n variants of each effect (`Charges`)
@@ -130,7 +130,7 @@ def _charges(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> C
 def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, beside: float) -> float:
     """Nats that effects gain in the spectra after their charges, with what is no part of these.
 
-    fits: to each half; charges: of all effects; beside: nats of the logged times and of the answer to noise.
+    fits: to each half; charges: of all effects; beside: nats of the logged times and of the echo.
     """
     held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), beside)
     return held_out + (charges.uncertain_floor_loss - price_of(fits[0].terms) - charges.choice_cost)

@@ -110,7 +110,7 @@ class NamelessGain:
     """Held-out nats that the nameless model gains; 0 where the relations of signals decide, which do not use it.
 
     over_none: over no effect; over_last_step: over the last step of the selection; outside_spectra: of the latter, what
-    logged times and answer to noise hold.
+    logged times and echo of noise hold.
     """
 
     over_none: float = 0.0

@@ -140,7 +140,7 @@ def _by_replay(search: Search, partial: PartialSelection, unusual: Sequence[Pass
 
 
 def nameless_nats(trial: Trial, base: Hypothesis | None) -> float:
-    """Held-out nats that the nameless model adds to a hypothesis, with those of logged times and answer to noise."""
+    """Held-out nats that the nameless model adds to a hypothesis, with those of logged times and echo of noise."""
     fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.halves, fits)), 0.0)
     return of_spectra + beside_spectra(trial.data, base.terms if base else ())

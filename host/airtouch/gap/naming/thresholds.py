@@ -40,7 +40,7 @@ def misfit(trial: Trial, base: Hypothesis, extended: Hypothesis, share: float, e
     """Nats that a further effect may gain because the models of those before it are wrong by a share of their gain.
 
     It is LEAST_GAIN at least. base, extended: as for `least_further_gain`. What effects gain by the logged times,
-    or by the answer to noise, does not count, as these are no models. With `NamingPolicy.misfit_by_cell`, and unless
+    or by the echo of noise, does not count, as these are no models. With `NamingPolicy.misfit_by_cell`, and unless
     `everywhere`, only the gain in cells in which the further effect gains counts (`gain_in_improved_cells`). These
     cells are not worked out for a further effect that gains more than the share of the whole.
     """

@@ -12,7 +12,7 @@ from airtouch.gap.flights.flight import Flight
 from airtouch.gap.loop import closed_loop, identify
 from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import disturbed
-from airtouch.gap.loop.noise_answer import nominal_answer
+from airtouch.gap.loop.noise_echo import nominal_echo
 from airtouch.gap.signals.channels import COMMAND, COUNT, RATE, TORQUE, angular_acceleration, residual
 from airtouch.gap.signals.floor import UNKNOWN_FLOOR, Floor, NominalBlocks, floor_of, sensor_power
 from airtouch.gap.signals.lost_rows import bridging_power
@@ -47,7 +47,7 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
     if loop is not None and response is not None and response.stepped_law is not None:
         over = response.stepped_law.power / np.maximum(response.quiet_law.power, VANISHING_POWER)
         loop = loop.with_steps(response.stepped_law.coherent, over, frequencies(AIR))
-    return Study(vehicle, calibration, loop, floor, response, nominal_answer(flights, vehicle),
+    return Study(vehicle, calibration, loop, floor, response, nominal_echo(flights, vehicle),
                  nominal_count=len(flights))
 
 

@@ -1,4 +1,4 @@
-"""How the commands answer the gyro's fast noise: by how much, and how late.
+"""The echo of the gyro's fast noise in the commands: how strong it is, and how late.
 
 Above FAST_HZ a vehicle hardly turns. What its gyro shows there is noise, and the controllers answer it as if it were
 rotation. So of roll, pitch and yaw, in rows of the log, and with both signals high-passed and of rms 1,
@@ -6,14 +6,14 @@ rotation. So of roll, pitch and yaw, in rows of the log, and with both signals h
     command(t) = sum over k of c_k rate(t - k rows) + other noise,    k = 0 .. LAGS - 1
 
 by least squares: an autoregression with an exogenous input of one block (Ljung, System Identification, 2nd ed. 1999,
-chapter 4). The coefficients c, the *answer*, belong to the control loop and to how it is logged; mass, motors and air
-do not change them. Sensors that are late do: noise that the controllers see later than the log has it is answered in
+chapter 4). The coefficients c, the *echo*, belong to the control loop and to how it is logged; mass, motors and air do
+not change them. Sensors that are late do: noise that the controllers see later than the log has it has its echo in
 another row, or in none where the loop runs faster than the log.
 
 **How sure.** The c of a flight differ from those of nominal flights by chance, with the covariance G^-1 / n of white
 noise (G: correlations of the rate, n: independent samples), and by as much more as nominal flights differ among each
 other. So with m nominal flights they follow Student's law of 9 (m - 1) degrees of freedom, for each of the LAGS
-coefficients of three axes. Another answer is anywhere: each coefficient normal, of mean 0 and standard deviation
+coefficients of three axes. Another echo is anywhere: each coefficient normal, of mean 0 and standard deviation
 ANYWHERE. `changed_nats` is the log likelihood of this over that.
 """
 
@@ -29,20 +29,20 @@ from airtouch.gap.loop.command_spectra import PADDING, commands
 from airtouch.vehicle import Vehicle
 
 FAST_HZ = 20.0  #: above it the gyro shows noise rather than turns; chosen
-LAGS = 3  #: rows, from the command's own on, in which it may answer; chosen: a loop that is 20 ms late hardly flies
+LAGS = 3  #: rows, from the command's own on, that may hold an echo; chosen: a loop that is 20 ms late hardly flies
 MARGIN_S = 0.2  #: next to what is no evidence that is left out as well, as the filter spreads it; chosen
 LEAST_SAMPLES = 200  #: that a flight needs, 2 s; chosen
-ANYWHERE = 0.5  #: standard deviation of a coefficient of an unknown answer; chosen: of rms 1 it is 1 at most
+ANYWHERE = 0.5  #: standard deviation of a coefficient of an unknown echo; chosen: of rms 1 it is 1 at most
 #: factor by which the rms of the fast rates may differ from that of nominal flights for the axis to count; chosen. What
-#: else shakes the vehicle or its gyro, the commands need not answer alike
+#: else shakes the vehicle or its gyro need not have the same echo
 ALIKE = 1.3
 RIDGE = 1e-3  #: added to the correlations of the rate, so that a pure tone does no harm; chosen
 INDEPENDENT = 1.0 - 2.0 * PERIOD_S * FAST_HZ  #: of the samples of white noise, those that the high-pass leaves
 
 
 @dataclass(frozen=True)
-class Answer:
-    """The answer of one flight, or the mean of several.
+class Echo:
+    """The echo in one flight, or the mean of several.
 
     coefficients (3, LAGS): c of roll, pitch and yaw; correlations (3, LAGS, LAGS): G; rms_radps (3,): of the fast
     rates; samples: n, independent ones.
@@ -55,25 +55,25 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class NominalAnswer:
-    """The answer of nominal flights: their mean, and how they differ.
+class NominalEcho:
+    """The echo in nominal flights: its mean, and how they differ.
 
     excess: their variance over that of chance, 1 at least; freedom: degrees of freedom that it is known with.
     """
 
-    mean: Answer
+    mean: Echo
     excess: float
     freedom: float
 
 
-def answer_of(flight: Flight, vehicle: Vehicle) -> Answer | None:
-    """The answer of a flight; None without a gyro, for less than LEAST_SAMPLES in the air, and without any noise."""
-    return flight.workspace.cached("noise answer", vehicle, lambda: None if flight.rates is None else answer_in(
+def echo_of(flight: Flight, vehicle: Vehicle) -> Echo | None:
+    """The echo in a flight; None without a gyro, for less than LEAST_SAMPLES in the air, and without any noise."""
+    return flight.workspace.cached("noise echo", vehicle, lambda: None if flight.rates is None else echo_in(
         flight.rates, commands(flight, vehicle)[:, 1:], (flight.phase != GROUND) & flight.usable))
 
 
-def answer_in(rates: np.ndarray, turning: np.ndarray, counts: np.ndarray) -> Answer | None:
-    """The answer of commands to rates, or None as for `answer_of`.
+def echo_in(rates: np.ndarray, turning: np.ndarray, counts: np.ndarray) -> Echo | None:
+    """The echo of rates in commands, or None as for `echo_of`.
 
     rates (n, 3), rad/s, and turning (n, 3): the commands of roll, pitch and yaw, in any unit; counts (n,): samples that
     are evidence, bool.
@@ -95,35 +95,34 @@ def answer_in(rates: np.ndarray, turning: np.ndarray, counts: np.ndarray) -> Ans
             return None
         correlations[axis] = before.T @ before / (len(rows) * rms[axis] ** 2) + RIDGE * np.eye(LAGS)
         coefficients[axis] = np.linalg.solve(correlations[axis], before.T @ command / (len(rows) * rms[axis] * scale))
-    return Answer(coefficients, correlations, rms, INDEPENDENT * len(rows))
+    return Echo(coefficients, correlations, rms, INDEPENDENT * len(rows))
 
 
-def mean_answer(answers: Sequence[Answer]) -> Answer:
-    """The mean of the answers of one or more flights, with the samples of all."""
-    return Answer(np.mean([a.coefficients for a in answers], axis=0),
-                  np.mean([a.correlations for a in answers], axis=0),
-                  np.mean([a.rms_radps for a in answers], axis=0), sum(a.samples for a in answers))
+def mean_echo(echoes: Sequence[Echo]) -> Echo:
+    """The mean of the echoes in one or more flights, with the samples of all."""
+    return Echo(np.mean([e.coefficients for e in echoes], axis=0), np.mean([e.correlations for e in echoes], axis=0),
+                np.mean([e.rms_radps for e in echoes], axis=0), sum(e.samples for e in echoes))
 
 
-def nominal_answer(flights: Sequence[Flight], vehicle: Vehicle) -> NominalAnswer | None:
-    """The answer of flights declared nominal; None where fewer than two of them have one."""
-    answers = [a for a in (answer_of(f, vehicle) for f in flights) if a is not None]
-    if len(answers) < 2:
+def nominal_echo(flights: Sequence[Flight], vehicle: Vehicle) -> NominalEcho | None:
+    """The echo in flights declared nominal; None where fewer than two of them have one."""
+    echoes = [e for e in (echo_of(f, vehicle) for f in flights) if e is not None]
+    if len(echoes) < 2:
         return None
-    mean = mean_answer(answers)
-    freedom = mean.coefficients.size * (len(answers) - 1)
-    off = [a.coefficients - mean.coefficients for a in answers]
-    squares = sum(a.samples * float(np.einsum("ai,aij,aj", d, mean.correlations, d))
-                  for a, d in zip(answers, off, strict=True))
-    return NominalAnswer(mean, max(squares / freedom, 1.0), float(freedom))
+    mean = mean_echo(echoes)
+    freedom = mean.coefficients.size * (len(echoes) - 1)
+    off = [e.coefficients - mean.coefficients for e in echoes]
+    squares = sum(e.samples * float(np.einsum("ai,aij,aj", d, mean.correlations, d))
+                  for e, d in zip(echoes, off, strict=True))
+    return NominalEcho(mean, max(squares / freedom, 1.0), float(freedom))
 
 
-def changed_nats(nominal: NominalAnswer, answers: Sequence[Answer]) -> float:
-    """Log likelihood, nats, of another answer than that of nominal flights over theirs; 0 where no axis counts.
+def changed_nats(nominal: NominalEcho, echoes: Sequence[Echo]) -> float:
+    """Log likelihood, nats, of another echo than in nominal flights over theirs; 0 where no axis counts.
 
-    answers: of flights with the same vehicle, one or more.
+    echoes: in flights with the same vehicle, one or more.
     """
-    ours, theirs = mean_answer(answers), nominal.mean
+    ours, theirs = mean_echo(echoes), nominal.mean
     alike = np.abs(np.log(ours.rms_radps / theirs.rms_radps)) < np.log(ALIKE)
     size = LAGS * int(alike.sum())
     if not size:
