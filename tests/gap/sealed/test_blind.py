@@ -21,6 +21,7 @@ from airtouch import logs
 from airtouch.cli.gap import command
 from airtouch.cli.gap.blind import SEVERITIES_TAKE
 from airtouch.errors import AirTouchError
+from airtouch.gap.flights.flight import GROUND
 from airtouch.gap.sealed import answers as blind_answers
 from airtouch.gap.sealed import intervals
 from airtouch.gap.sealed import key as blind_key
@@ -446,6 +447,18 @@ def test_a_diagnosis_of_several_flights_together_is_refused():
                   lambda: blind_answers.check_answers([together], ["a", "b"])):
         with pytest.raises(AirTouchError, match="2 flights.*--each"):
             score()
+
+
+@pytest.mark.parametrize(("standing_s", "lost_s", "flown"), [(2.5, 0.0, True), (4.0, 0.0, False), (0.0, 9.0, True)])
+def test_a_vehicle_that_comes_to_stand_on_the_platform_has_crashed(standing_s, lost_s, flown):
+    """A flight of 10 s with 5 s on the ground before it, which do not count; lost rows are no contact."""
+    phase = np.where(np.arange(1500) < 500, GROUND, GROUND + 1)
+    lost = np.arange(1500) >= 1500 - round(100 * lost_s)
+    usable = (phase != GROUND) & (np.arange(1500) >= 500 + round(100 * standing_s)) & ~lost
+    flight = SimpleNamespace(phase=phase, usable=usable, lost=lost)
+    assert blind_severity.all_flown([flight]) == flown and not blind_severity.all_flown([])
+    assert blind_severity.all_flown([flight, SimpleNamespace(phase=phase, usable=phase != GROUND, lost=0 * phase == 1)]
+                                    ) == flown
 
 
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():

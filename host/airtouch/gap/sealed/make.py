@@ -19,7 +19,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.sealed.key import ANSWERS, OPENED, SEALED, DrawnEffect, DrawnFlight, Key, key_path, seal
-from airtouch.gap.sealed.severity import Conditions, log_ratio, three_severities, weakest
+from airtouch.gap.sealed.severity import Conditions, all_flown, log_ratio, three_severities, weakest
 from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.random_draws import KINDS
@@ -200,14 +200,15 @@ def _flight(plan: Plan, number: int, draws: Sequence[Draw], rng: np.random.Gener
             ) -> tuple[FlightLog, tuple[DrawnEffect, ...]]:
     """The flight of a number that ends well, and what acts in it: after a crash another one, a little weaker.
 
-    Raises AirTouchError where TRIES flights crash.
+    A vehicle that comes to stand on the platform has crashed too (`severity.all_flown`). Raises AirTouchError where
+    TRIES flights crash.
     """
     for attempt in range(TRIES):
         active: list[Active] = [KINDS[d.kind].active(plan.severities[d.kind][d.level] * WEAKER ** attempt, rng)
                                 for d in draws]
         log = next(iter(flown(SCENARIO, [number + ANEW * attempt], vehicle=plan.vehicle, effects=active,
                               seed=plan.seed, workers=1)))
-        if isinstance(log, FlightLog) and list(ready_flights([stripped(log)], plan.vehicle, [])):
+        if isinstance(log, FlightLog) and all_flown(list(ready_flights([stripped(log)], plan.vehicle, []))):
             return stripped(log), tuple(DrawnEffect(a.effect.name, d.kind, d.level, dict(a.values))
                                         for a, d in zip(active, draws, strict=True))
     raise AirTouchError(f"{', '.join(d.kind for d in draws)}: {TRIES} flights crashed; lower its highest strength")
