@@ -92,7 +92,7 @@ def test_torque_that_the_gyro_may_make_does_not_count_where_its_noise_has_anothe
     above_means = np.zeros((len(frequencies(AIR)), 3), bool)
     above_means[FIRST_BIN:] = True
     response = SimpleNamespace(may_be_gyro=above_means)
-    data = SimpleNamespace(means_only=False, study=SimpleNamespace(response=response, same_models=same_models))
+    data = SimpleNamespace(study=SimpleNamespace(response=response, same_models=same_models))
     monkeypatch.setattr("airtouch.gap.evidence.flattened.changed_echo_nats", lambda _: nats)
     keep = _counted(data)[AIR]
     assert keep[FIRST_BIN:, TORQUE].any() == torque_counts

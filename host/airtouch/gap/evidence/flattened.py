@@ -137,10 +137,11 @@ def _counted(data: Data) -> dict[str, np.ndarray]:
     keep = {state: judged_bins(state) for state in (AIR, REST)}
     for table in keep.values():
         table[:, COMMAND] = False  # the command view judges them
-    if data.means_only or data.study.response is None:
+    response = data.study.response
+    if response is None:
         keep[AIR][FIRST_BIN:, TORQUE] = False
     elif changed_echo_nats(data) and not data.study.same_models:
-        keep[AIR][:, TORQUE] &= ~data.study.response.may_be_gyro
+        keep[AIR][:, TORQUE] &= ~response.may_be_gyro
     return keep
 
 
