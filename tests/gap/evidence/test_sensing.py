@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from airtouch.gap.evidence import sensing
-from airtouch.gap.evidence.sensing import LEAST_CHANGED, beside_spectra, changed_echo_nats, sensing_gain
+from airtouch.gap.evidence.sensing import LEAST_CHANGED, changed_echo_nats, outside_spectra, sensing_gain
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.workspace import Workspace
 
@@ -34,15 +34,15 @@ def test_late_sensors_gain_what_another_echo_gains(flown):
 
 def test_what_no_effect_explains_is_left_beside_the_times(flown):
     data = flown(SURE)
-    assert beside_spectra(data, ()) == SURE + 3.0 == beside_spectra(data, MASS)
-    assert beside_spectra(data, LATE) == 3.0
+    assert outside_spectra(data, ()) == SURE + 3.0 == outside_spectra(data, MASS)
+    assert outside_spectra(data, LATE) == 3.0
 
 
 @pytest.mark.parametrize("data", [
     {"nats": LEAST_CHANGED - 0.1}, {"nats": -20.0},  # as in nominal flights
     {"nats": SURE, "simulated": False},  # the fast noise of recorded flights differs from flight to flight
     {"nats": None},  # too few nominal flights
-    {"nats": SURE, "flights": ("a flight", None)}])  # one has no gyro
+    {"nats": SURE, "flights": ("a flight", None)}])  # one is too short for an echo
 def test_no_other_echo(flown, data):
     assert changed_echo_nats(flown(**data)) == 0.0 == sensing_gain(flown(**data), LATE)
-    assert beside_spectra(flown(**data), ()) == 3.0
+    assert outside_spectra(flown(**data), ()) == 3.0

@@ -60,13 +60,13 @@ def test_loss_by_channel():
     gains[[lift, lift + COUNT]] = 100.0, -30.0  # it explains the means, and is wrong faster than that
     gains[[forward, forward + COUNT, forward + 2 * COUNT]] = -0.9, -5.0, -3.0
     gains[at_rest + forward] = -8.0
-    sideways, roll = 1, 3
-    gains[[sideways, roll + COUNT]] = -50.0, -4.0  # nothing gains in force x or torque y
+    sideways, roll, pitch = 1, 3, 4
+    gains[[sideways, roll + COUNT, pitch]] = -50.0, -4.0, -6.0  # of x and y together nothing gains
     loss = over_prediction_by_channel(gains)
-    assert loss[sideways] == 49.0 and loss[roll] == 3.0
+    assert loss[roll] == 3.0 + 5.0
     assert loss[lift] == pytest.approx(30.0 - 1.0 - 0.2 * 100.0)
-    assert loss[forward] == pytest.approx(0.0 + 4.0 + 2.0) and loss[at_rest + forward] == pytest.approx(7.0)
-    assert np.count_nonzero(loss) == 5
+    assert loss[forward] == pytest.approx(0.0 + 4.0 + 2.0 + 49.0) and loss[at_rest + forward] == pytest.approx(7.0)
+    assert np.count_nonzero(loss) == 4
 
 
 @pytest.mark.parametrize(("explained", "wrong"), [

@@ -455,10 +455,10 @@ def test_a_vehicle_that_comes_to_stand_on_the_platform_has_crashed(standing_s, l
     phase = np.where(np.arange(1500) < 500, GROUND, GROUND + 1)
     lost = np.arange(1500) >= 1500 - round(100 * lost_s)
     usable = (phase != GROUND) & (np.arange(1500) >= 500 + round(100 * standing_s)) & ~lost
-    flight = SimpleNamespace(phase=phase, usable=usable, lost=lost)
+    flight = SimpleNamespace(phase=phase, usable=usable, not_logged=lost)
     assert blind_severity.all_flown([flight]) == flown and not blind_severity.all_flown([])
-    assert blind_severity.all_flown([flight, SimpleNamespace(phase=phase, usable=phase != GROUND, lost=0 * phase == 1)]
-                                    ) == flown
+    calm = SimpleNamespace(phase=phase, usable=phase != GROUND, not_logged=np.zeros(1500, bool))
+    assert blind_severity.all_flown([flight, calm]) == flown
 
 
 def test_the_weakest_of_normal_log_ratios_is_seen_as_often_as_said():

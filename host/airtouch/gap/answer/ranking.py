@@ -38,9 +38,9 @@ def verdict_of(data: Data, selection: Selection, gap: Gap) -> str:
 def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
     """Whether something acts that a gap at its floor cannot show. Any one of four signs is enough.
 
-    1. Every effect named is an error of the logged times, passes, or delays the echo of noise where that is another
-       one. Times and echo are no part of the gap. The gap is measured in what both halves of the data show, and an
-       effect that passes is seldom in both.
+    1. Every effect named is an error of the logged times, passes, or explains another echo of noise. Times and echo are
+       no part of the gap. The gap is measured in what both halves of the data show, and an effect that passes is seldom
+       in both.
     2. In recorded flights: they are less steady than nominal ones, by more than may be chance. The gap is a mean over
        seconds in which little acts.
     3. In simulated flights: what logged times and echo hold beside the effects is more than chance allows.
@@ -53,8 +53,8 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
         return True
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
-    beside_spectra = selection.nameless.outside_spectra > counterevidence(selection).limit
-    return beside_spectra or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
+    unexplained_outside = selection.nameless.outside_spectra > counterevidence(selection).limit
+    return unexplained_outside or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

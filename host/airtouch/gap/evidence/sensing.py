@@ -1,10 +1,10 @@
 """Evidence in the echo of the gyro's fast noise (`loop.noise_echo`): whether the controllers see late.
 
-The echo is no part of the spectra. An effect that delays what the controllers see gains what another echo gains over
-that of nominal flights, whatever its delay: in which row a later echo shows depends on how loop and log are timed.
-Where the echo is another one, the noise in the measured torque no longer follows the commands as in nominal flights. So
-those values of the torque that this noise may make count no longer, unless the loop is the firmware's, of which a model
-says how they change (`flattened`).
+Effects with `delays_sensing` gain the log likelihood of another echo than in nominal flights. The gain does not depend
+on the fitted delay, because the row of a late echo depends on how loop and log are timed. Where the echo is another
+one, the noise in the measured torque no longer follows the commands as in nominal flights. So those values of the
+torque that this noise may make count no longer, unless the loop is the firmware's, of which a model says how they
+change (`flattened`). Where the relations of signals decide, the echo is no evidence.
 
 In recorded flights the echo does not count. It differs from one nominal flight to the next by 3 to 20 times the
 variance of chance, in simulated ones by that of chance alone. Two of 177 recorded nominal flights would have another
@@ -18,7 +18,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.loop.noise_echo import changed_nats, echo_of
 from airtouch.gap.signatures.term import Term
 
-LEAST_CHANGED = 6.0  #: nats from which on the echo is another one: odds of 400; chosen
+LEAST_CHANGED = 6.0  #: nats from which on the echo is another one: odds of 400; chosen with flights in view
 
 
 def changed_echo_nats(data: Data) -> float:
@@ -44,6 +44,6 @@ def sensing_gain(data: Data, terms: Sequence[Term]) -> float:
     return changed_echo_nats(data) if any(t.signature.delays_sensing for t in terms) else 0.0
 
 
-def beside_spectra(data: Data, terms: Sequence[Term]) -> float:
+def outside_spectra(data: Data, terms: Sequence[Term]) -> float:
     """Nats of logged times and echo that no effect explains, and that the spectra do not show."""
     return unexplained_clock_gain(data, terms) + changed_echo_nats(data) - sensing_gain(data, terms)

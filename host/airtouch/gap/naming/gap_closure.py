@@ -7,8 +7,8 @@ baseline of another drone a bias or a wind may gain held-out likelihood and yet 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from airtouch.gap.evidence.clock import unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.sensing import beside_spectra
 from airtouch.gap.naming.policy import LEAST_CLOSED, STANDS_OUT
 from airtouch.gap.naming.records import NamelessGain, Selection, WithdrawnNames
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -52,7 +52,7 @@ def with_names_withdrawn(data: Data, selection: Selection, shrink: float) -> Sel
     """
     over_none = selection.nameless.over_none
     names = tuple(s.name for s in selection.named_steps)
-    return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, beside_spectra(data, ())),
+    return replace(selection, steps=(), nameless=NamelessGain(over_none, over_none, unexplained_clock_gain(data, ())),
                    spectrum_is_assumed=False, withdrawn=WithdrawnNames(names, shrink))
 
 

@@ -1,0 +1,71 @@
+"""Late sensors are named by the echo of noise where no library of relations holds, once, and with a wider interval."""
+
+import pytest
+
+from airtouch import vehicle as vehicles
+from airtouch.gap.answer.estimates import ROW_VARIANCE_S2, from_spectra
+from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.sensing import changed_echo_nats
+from airtouch.gap.flights.flight import ready_flights
+from airtouch.gap.naming.judging import PricedVariant, cross_validated, trial_of
+from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.signatures.candidates import all_candidates
+from airtouch.simulation import batch
+from airtouch.simulation.effects import Active, get
+
+VEHICLE = vehicles.load("crazyflie-2.1-flow")
+LATE = "sensor_latency"
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    """A hover whose sensors are 4 ms late, against four without: its log, its diagnosis and that without the effect."""
+    baseline = list(batch.flights("hover", range(900, 904), vehicle=VEHICLE, workers=1))
+    active = [Active(get(LATE), get(LATE).values({"delay": 0.004}))]
+    log, = batch.flights("hover", [950], vehicle=VEHICLE, effects=active, workers=1)
+    with_it = diagnose([log], VEHICLE, baseline)
+    return log, with_it, diagnose([log], VEHICLE, baseline, without=(LATE,))
+
+
+@pytest.fixture(scope="module")
+def trial(diagnosed):
+    log, with_it, _ = diagnosed
+    return trial_of(Data(with_it.calibrated[0], list(ready_flights([log], VEHICLE, []))))
+
+
+def hypothesis(trial, name, base=None):
+    return cross_validated(trial, PricedVariant(name, all_candidates(())[name][0], 0.0), base)
+
+
+def test_late_sensors_are_named_first(diagnosed):
+    _, with_it, _ = diagnosed
+    assert with_it.effects[0].name == LATE and any("echo" in note for note in with_it.notes)
+    delay = with_it.effects[0].parameters["delay"]
+    assert delay.low <= 0.004 <= delay.high
+
+
+def test_without_the_effect_the_echo_is_left(diagnosed):
+    assert diagnosed[2].verdict == "unknown"
+
+
+def test_the_echo_is_gained_once(trial):
+    echo = changed_echo_nats(trial.data)
+    late = hypothesis(trial, LATE)
+    in_spectra = late.gain - echo
+    beside = hypothesis(trial, "mass", late)
+    assert echo > 20.0 and abs(in_spectra) < 20.0
+    assert abs(beside.gain - late.gain) < 15.0, "a mass beside it gains nothing, and the echo is not gained again"
+    assert hypothesis(trial, "mass").gain < 15.0
+    evidence = round_of(trial, {LATE: all_candidates(())[LATE]}, None)[LATE].evidence
+    assert evidence >= 20.0, "how rare the delay is in nominal flights does not limit what the echo gains"
+
+
+def test_the_delay_is_known_to_a_row(trial, monkeypatch):
+    late = hypothesis(trial, LATE)
+    fitted = late.fits[0]
+    term, = fitted.terms
+    wide = from_spectra(trial.data, term, fitted, late.fits).covariance
+    monkeypatch.setattr("airtouch.gap.answer.estimates.sensing_gain", lambda *_: 0.0)
+    narrow = from_spectra(trial.data, term, fitted, late.fits).covariance
+    assert (wide - narrow) * term.step("delay") ** 2 == pytest.approx(ROW_VARIANCE_S2)
