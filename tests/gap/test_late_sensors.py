@@ -1,21 +1,27 @@
 """Late sensors are named by the echo of noise where no library of relations holds, once, and with a wider interval."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from airtouch import vehicle as vehicles
 from airtouch.gap.answer.estimates import ROW_VARIANCE_S2, from_spectra
 from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.evidence import sensing
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.sensing import changed_echo_nats
+from airtouch.gap.evidence.sensing import LEAST_CHANGED, changed_echo_nats, outside_spectra, sensing_gain
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.naming.judging import PricedVariant, cross_validated, trial_of
 from airtouch.gap.naming.rounds import round_of
-from airtouch.gap.signatures.candidates import all_candidates
+from airtouch.gap.signatures.candidates import all_candidates, terms
+from airtouch.gap.workspace import Workspace
 from airtouch.simulation import batch
 from airtouch.simulation.effects import Active, get
 
 VEHICLE = vehicles.load("crazyflie-2.1-flow")
 LATE = "sensor_latency"
+LATE_TERMS, MASS_TERMS = terms(LATE)[:1], terms("mass")[:1]
+SURE = LEAST_CHANGED + 10.0
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +75,38 @@ def test_the_delay_is_known_to_a_row(trial, monkeypatch):
     monkeypatch.setattr("airtouch.gap.answer.estimates.sensing_gain", lambda *_: 0.0)
     narrow = from_spectra(trial.data, term, fitted, late.fits).covariance
     assert (wide - narrow) * term.step("delay") ** 2 == pytest.approx(ROW_VARIANCE_S2)
+
+
+@pytest.fixture
+def flown(monkeypatch):
+    """A function that makes a stand-in for flights whose echo is another one by so many nats."""
+    monkeypatch.setattr(sensing, "echo_of", lambda flight, _: flight)
+    monkeypatch.setattr(sensing, "changed_nats", lambda nats, _: nats)
+    monkeypatch.setattr(sensing, "unexplained_clock_gain", lambda *_: 3.0)
+
+    def data(nats, simulated=True, flights=("a flight",)):
+        study = SimpleNamespace(echo=nats, simulated=simulated, vehicle="any")
+        return SimpleNamespace(study=study, flights=flights, workspace=Workspace())
+    return data
+
+
+def test_late_sensors_gain_what_another_echo_gains(flown):
+    data = flown(SURE)
+    assert sensing_gain(data, LATE_TERMS) == SURE == sensing_gain(data, [*MASS_TERMS, *LATE_TERMS])
+    assert sensing_gain(data, MASS_TERMS) == 0.0 == sensing_gain(data, ())
+
+
+def test_what_no_effect_explains_is_left_beside_the_times(flown):
+    data = flown(SURE)
+    assert outside_spectra(data, ()) == SURE + 3.0 == outside_spectra(data, MASS_TERMS)
+    assert outside_spectra(data, LATE_TERMS) == 3.0
+
+
+@pytest.mark.parametrize("data", [
+    {"nats": LEAST_CHANGED - 0.1}, {"nats": -20.0},  # as in nominal flights
+    {"nats": SURE, "simulated": False},  # the fast noise of recorded flights differs from flight to flight
+    {"nats": None},  # too few nominal flights
+    {"nats": SURE, "flights": ("a flight", None)}])  # one is too short for an echo
+def test_no_other_echo(flown, data):
+    assert changed_echo_nats(flown(**data)) == 0.0 == sensing_gain(flown(**data), LATE_TERMS)
+    assert outside_spectra(flown(**data), ()) == 3.0
