@@ -6,8 +6,8 @@ rotation. So of roll, pitch and yaw, in rows of the log, and with both signals h
     command(t) = sum over k of c_k rate(t - k rows) + other noise,    k = 0 .. LAGS - 1
 
 by least squares: an autoregression with an exogenous input of one block (Ljung, System Identification, 2nd ed. 1999,
-chapter 4). The coefficients c, the *echo*, belong to the control loop and to how it is logged; mass, motors and air do
-not change them. Sensors that are late do: noise that the controllers see later than the log has it has its echo in
+chapter 4). The coefficients c, the *echo*, belong to the control loop and to how it is logged; mass, motors and air
+hardly change them. Sensors that are late do: noise that the controllers see later than the log has it has its echo in
 another row, or in none where the loop runs faster than the log.
 
 **How sure.** The c of a flight differ from those of nominal flights by chance, with a covariance of at most G^-1 / n
@@ -35,7 +35,7 @@ LAGS = 3  #: rows, from the command's own on, that may hold an echo; chosen: a l
 MARGIN_S = 0.2  #: next to what is no evidence that is left out as well, as the filter spreads it; chosen
 LEAST_SAMPLES = 200  #: that a flight needs, 2 s; chosen
 ANYWHERE = 0.5  #: standard deviation of a coefficient of an unknown echo; chosen
-SCALES = (0.6, 1.6)  #: factors by which an echo may be weaker or stronger and still be the same; chosen
+SCALES = (0.5, 2.0)  #: factors by which an echo may be weaker or stronger and still be the same; chosen
 #: degrees of freedom of a variance that is chance alone, as two more nominal flights: in each of seven simulated
 #: baselines of two to eight flights the variance was that of chance (host/docs/looks.md, 2026-11-28 08:18)
 PRIOR_FREEDOM = 18.0
