@@ -9,7 +9,7 @@ from airtouch.gap.answer.estimates import ROW_VARIANCE_S2, from_spectra
 from airtouch.gap.diagnosis import diagnose
 from airtouch.gap.evidence import sensing
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.sensing import LEAST_CHANGED, changed_echo_nats, outside_spectra, sensing_gain
+from airtouch.gap.evidence.sensing import LEAST_CHANGED, changed_echo_nats, sensing_gain, unexplained_outside
 from airtouch.gap.flights.flight import ready_flights
 from airtouch.gap.naming.judging import PricedVariant, cross_validated, trial_of
 from airtouch.gap.naming.rounds import round_of
@@ -98,8 +98,8 @@ def test_late_sensors_gain_what_another_echo_gains(flown):
 
 def test_what_no_effect_explains_is_left_beside_the_times(flown):
     data = flown(SURE)
-    assert outside_spectra(data, ()) == SURE + 3.0 == outside_spectra(data, MASS_TERMS)
-    assert outside_spectra(data, LATE_TERMS) == 3.0
+    assert unexplained_outside(data, ()) == SURE + 3.0 == unexplained_outside(data, MASS_TERMS)
+    assert unexplained_outside(data, LATE_TERMS) == 3.0
 
 
 @pytest.mark.parametrize("data", [
@@ -109,4 +109,4 @@ def test_what_no_effect_explains_is_left_beside_the_times(flown):
     {"nats": SURE, "flights": ("a flight", None)}])  # one is too short for an echo
 def test_no_other_echo(flown, data):
     assert changed_echo_nats(flown(**data)) == 0.0 == sensing_gain(flown(**data), LATE_TERMS)
-    assert outside_spectra(flown(**data), ()) == 3.0
+    assert unexplained_outside(flown(**data), ()) == 3.0

@@ -83,7 +83,7 @@ def test_a_late_echo_is_another_one(late):
 def test_nats_are_those_of_scipys_densities(excess):
     """The coefficients' density under nominal flights is Student's, under another echo normal.
 
-    The echo is a row late, so that of the nominal one hardly any is left: the smallest factor fits best.
+    The test's echo is a row late, so the nominal one fits it best at its smallest scale.
     """
     nominal, test = as_nominal([flown(5), flown(6), flown(7)], excess), flown(8, late=1)
     of_nominal = nominal.mean

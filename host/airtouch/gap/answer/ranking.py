@@ -53,8 +53,8 @@ def _acts_outside_the_gap(data: Data, selection: Selection, gap: Gap) -> bool:
         return True
     if not data.study.simulated:
         return unsteadiness_ratio(selection) >= 1.0
-    unexplained_outside = selection.nameless.outside_spectra > counterevidence(selection).limit
-    return unexplained_outside or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
+    more_than_chance = selection.nameless.outside_spectra > counterevidence(selection).limit
+    return more_than_chance or is_nearer_to_floor(data, selection.halves, hypothesis, gap)
 
 
 def ranking_of(data: Data, selection: Selection, gap: Gap, verdict: str, answer: str) -> list[RankedCandidate]:

@@ -13,7 +13,7 @@ echo than others of their day (host/docs/looks.md, 2026-11-28 08:50).
 
 from collections.abc import Sequence
 
-from airtouch.gap.evidence.clock import unexplained_clock_gain
+from airtouch.gap.evidence.clock import clock_gains, unexplained_clock_gain
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.loop.noise_echo import changed_nats, echo_of
 from airtouch.gap.signatures.term import Term
@@ -44,6 +44,11 @@ def sensing_gain(data: Data, terms: Sequence[Term]) -> float:
     return changed_echo_nats(data) if any(t.signature.delays_sensing for t in terms) else 0.0
 
 
-def outside_spectra(data: Data, terms: Sequence[Term]) -> float:
-    """Nats of logged times and echo that no effect explains, and that the spectra do not show."""
+def gain_outside(data: Data, terms: Sequence[Term]) -> float:
+    """Nats that effects gain outside the spectra: by the logged times and by the echo."""
+    return clock_gains(data, terms) + sensing_gain(data, terms)
+
+
+def unexplained_outside(data: Data, terms: Sequence[Term]) -> float:
+    """Nats outside the spectra, of logged times and echo, that no effect explains."""
     return unexplained_clock_gain(data, terms) + changed_echo_nats(data) - sensing_gain(data, terms)

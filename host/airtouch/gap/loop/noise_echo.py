@@ -25,6 +25,7 @@ from math import lgamma
 
 import numpy as np
 
+from airtouch.gap.flights.contact import within
 from airtouch.gap.flights.filters import both_ways, highpass
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.loop.command_spectra import PADDING, commands
@@ -37,7 +38,7 @@ LEAST_SAMPLES = 200  #: that a flight needs, 2 s; chosen
 ANYWHERE = 0.5  #: standard deviation of a coefficient of an unknown echo; chosen
 SCALES = (0.5, 2.0)  #: factors by which an echo may be weaker or stronger and still be the same; chosen
 #: degrees of freedom of a variance that is chance alone, as two more nominal flights: in each of seven simulated
-#: baselines of two to eight flights the variance was that of chance (host/docs/looks.md, 2026-11-28 08:18)
+#: baselines of two to eight flights the variance was no more than chance (host/docs/looks.md, 2026-11-28 08:18)
 PRIOR_FREEDOM = 18.0
 #: factor by which the rms of the fast rates may differ from that of nominal flights for the axis to count; chosen. What
 #: else shakes the vehicle or its gyro need not have the same echo
@@ -85,9 +86,9 @@ def echo_in(rates: np.ndarray, torque_commands: np.ndarray, valid: np.ndarray) -
     rates (n, 3), rad/s; torque_commands (n, 3): of roll, pitch and yaw, in any unit; valid (n,): samples that are
     evidence, bool.
     """
-    margin = round(MARGIN_S / PERIOD_S)
-    spread = np.convolve(~valid, np.ones(2 * margin + 1), "same")[:len(valid)]
-    rows = np.flatnonzero(valid & (spread < 0.5))
+    if valid.sum() < LEAST_SAMPLES:
+        return None
+    rows = np.flatnonzero(~within(~valid, MARGIN_S))
     rows = rows[rows >= LAGS]
     if len(rows) < LEAST_SAMPLES:
         return None

@@ -23,7 +23,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.judge import cell_gains, judge
 from airtouch.gap.evidence.problem import TWO_FOLDS, BlockSet
-from airtouch.gap.evidence.sensing import sensing_gain
+from airtouch.gap.evidence.sensing import gain_outside
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.signals.spectra import AIR, REST
@@ -102,17 +102,16 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | Non
     terms, before = variant.terms, base.terms if base else ()
     charges = _charges(trial, variant, base)
     if base and all(t.shows_in == CLOCK for t in terms):  # nothing changes in the spectra
-        gain, fits = base.gain - variant.choice_cost, base.fits
+        gain, fits = base.gain - variant.choice_cost + clock_gains(trial.data, terms), base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
         fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
-        gain = _charged_gain(trial, fits, charges,
-                             clock_gains(trial.data, before) + sensing_gain(trial.data, (*before, *terms)))
+        gain = _charged_gain(trial, fits, charges, gain_outside(trial.data, (*before, *terms)))
     of_clock = [measured_clock_term(trial.data, t).term for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
     fitted = (*(fits[0].terms if fits else ()), *of_clock)
     strength = strength_of(strength_term(terms), fitted, fits)
-    return Hypothesis(variant.name, fitted, gain + clock_gains(trial.data, terms), fits, not brief, charges, strength)
+    return Hypothesis(variant.name, fitted, gain, fits, not brief, charges, strength)
 
 
 def _charges(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> Charges:
@@ -127,12 +126,12 @@ def _charges(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> C
     return before.with_effect(variant.choice_cost, uncertain_floor_loss(trial, base.fits))
 
 
-def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, beside: float) -> float:
-    """Nats that effects gain in the spectra after their charges, with what is no part of these.
+def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, outside: float) -> float:
+    """Nats that effects gain in the spectra after their charges, and outside them.
 
-    fits: to each half; charges: of all effects; beside: nats of the logged times and of the echo.
+    fits: to each half; charges: of all effects; outside: nats of the logged times and of the echo.
     """
-    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), beside)
+    held_out = sum((gain_of(trial, test, fits[train].terms) for train, test in TWO_FOLDS), outside)
     return held_out + (charges.uncertain_floor_loss - price_of(fits[0].terms) - charges.choice_cost)
 
 

@@ -7,10 +7,9 @@ added to both.
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
-from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.fit import FittedTerms, fit, mean_parameters
 from airtouch.gap.evidence.problem import TWO_FOLDS
-from airtouch.gap.evidence.sensing import sensing_gain
+from airtouch.gap.evidence.sensing import gain_outside
 from airtouch.gap.naming.judging import Trial, gain_of, price_of, uncertain_floor_loss
 from airtouch.gap.naming.records import Step, new_terms
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD
@@ -39,7 +38,7 @@ def _gain_without(trial: Trial, steps: Sequence[Step], index: int) -> float:
     """Held-out nats of the last step's hypothesis without the effect of one step, the others fitted anew."""
     last, dropped = steps[-1], _new_slots(steps, index)
     others = _without(last.terms, dropped)
-    gain = clock_gains(trial.data, others) + sensing_gain(trial.data, others)
+    gain = gain_outside(trial.data, others)
     cost_of_dropped = steps[index].charges.choice_cost - (steps[index - 1].charges.choice_cost if index else 0.0)
     cost_of_others = last.charges.choice_cost - cost_of_dropped
     if all(t.shows_in == CLOCK for t in others):

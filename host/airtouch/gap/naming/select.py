@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from airtouch.gap.evidence.data import Data
-from airtouch.gap.evidence.sensing import outside_spectra
+from airtouch.gap.evidence.sensing import unexplained_outside
 from airtouch.gap.nameless.model import held_out_gains
 from airtouch.gap.naming.by_relations import inference_of, selection_by_relations
 from airtouch.gap.naming.forward import PartialSelection, Search, forward
@@ -129,7 +129,7 @@ def _by_replay(search: Search, partial: PartialSelection, unusual: Sequence[Pass
     over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
     selection = Selection(
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
-        nameless=NamelessGain(over_none, over_last_step, outside_spectra(trial.data, last)),
+        nameless=NamelessGain(over_none, over_last_step, unexplained_outside(trial.data, last)),
         spectrum_is_assumed=assumes(trial.data, last) if policy.loop_is_assumed else bool(random_of(last)),
         policy=policy, outgained=outgained(search, unusual))
     if policy.judges_unsteadiness:
@@ -143,5 +143,5 @@ def nameless_nats(trial: Trial, base: Hypothesis | None) -> float:
     """Held-out nats that the nameless model adds to a hypothesis, with those of logged times and echo of noise."""
     fits = [f.terms for f in base.fits] if base and base.fits else [(), ()]
     of_spectra = max(sum(held_out_gains(trial.data, trial.halves, fits)), 0.0)
-    return of_spectra + outside_spectra(trial.data, base.terms if base else ())
+    return of_spectra + unexplained_outside(trial.data, base.terms if base else ())
 

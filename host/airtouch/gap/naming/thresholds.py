@@ -8,10 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from airtouch.gap.evidence.cells import CELLS, sensor_cells
-from airtouch.gap.evidence.clock import clock_gains
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import CELL_GAIN
-from airtouch.gap.evidence.sensing import sensing_gain
+from airtouch.gap.evidence.sensing import gain_outside
 from airtouch.gap.naming.judging import Trial, held_out_cell_gains
 from airtouch.gap.naming.policy import LEAST_GAIN, MISFIT_SHARE_RANDOM
 from airtouch.gap.naming.records import Hypothesis
@@ -44,8 +43,7 @@ def misfit(trial: Trial, base: Hypothesis, extended: Hypothesis, share: float, e
     `everywhere`, only the gain in cells in which the further effect gains counts (`gain_in_improved_cells`). These
     cells are not worked out for a further effect that gains more than the share of the whole.
     """
-    of_no_model = clock_gains(trial.data, base.terms) + sensing_gain(trial.data, base.terms)
-    whole = max(LEAST_GAIN, share * (base.gain - of_no_model))
+    whole = max(LEAST_GAIN, share * (base.gain - gain_outside(trial.data, base.terms)))
     fitted = extended.full and extended.fits and base.fits
     if everywhere or not trial.policy.misfit_by_cell or not fitted or extended.gain - base.gain >= whole:
         return whole
