@@ -26,7 +26,7 @@ from airtouch.cli.shared.progress import Bar
 from airtouch.errors import AirTouchError, in_one_line
 from airtouch.logs import write
 from airtouch.logs.files import make_folder, write_bytes
-from rotorpy_loop.labels import Label, labels_of
+from rotorpy_loop.labels import OTHERS, STRENGTHS, Label, labels_of
 
 MANIFEST = "manifest.csv"
 
@@ -40,8 +40,9 @@ def main() -> None:
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of all that is drawn (default %(default)s)")
     parser.add_argument("--slow-error", type=factor, default=1.0, metavar="FACTOR",
                         help="on the slow error of position and velocity, 4 mm and 2 cm/s rms (default %(default)s)")
+    parser.add_argument("--others", action="store_true", help="effects that FLIGHTS/peers lacks, instead of those there")
     options = parser.parse_args()
-    labels = labels_of(options.each, options.nominal, options.seed)
+    labels = labels_of(options.each, options.nominal, options.seed, OTHERS if options.others else STRENGTHS)
     text = manifest(labels, options.slow_error)
     check(options.out, text)
     make_folder(options.out)

@@ -10,7 +10,7 @@ from airtouch.gap import diagnosis
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import GROUND, PERIOD_S
 from airtouch.gap.passing import bursts as passing_bursts
-from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate
+from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate, push_gate
 from airtouch.gap.passing.gate_search import ENDS
 from airtouch.gap.signals.channels import inside
 from airtouch.logs.flight_log import FlightLog
@@ -60,6 +60,30 @@ def test_bursts_that_fill_what_counts_are_none(study, nominal_flight, monkeypatc
     level = np.where(piece % 5 < 2, np.sqrt(30.0), 1.0)
     with_residual(monkeypatch, level * np.random.default_rng(0).normal(size=len(piece)))
     assert burst_gate(Data(study, [nominal_flight]), FORCE_BURSTS) == ((), 0.0)
+
+
+def test_pushes_are_those_of_half_the_strongest_at_least(study, nominal_flight, monkeypatch):
+    """A bell of height h and width sigma is over 1.5 within sigma sqrt(2 log(h / 1.5)) of its middle.
+
+    One of a third of the strongest is none, nor is one that points up.
+    """
+    t, sigma_s = np.arange(len(nominal_flight)) * PERIOD_S, 0.2
+    bells = [height * np.exp(-0.5 * ((t - at_s) / sigma_s) ** 2) for at_s, height in
+             ((10.0, -3.0), (12.0, -2.5), (14.0, -1.0), (16.0, 2.0))]
+    noise = 0.05 * np.random.default_rng(0).normal(size=len(t))
+    with_residual(monkeypatch, sum(bells) + noise)
+    gate, cost = push_gate(Data(study, [nominal_flight]))
+    expected = [[at_s - half_s, at_s + half_s] for at_s, half_s in
+                ((at_s, sigma_s * np.sqrt(2.0 * np.log(height / 1.5))) for at_s, height in ((10.0, 3.0), (12.0, 2.5)))]
+    np.testing.assert_allclose([ends for _, *ends in gate], expected, atol=0.05)
+    assert cost > 0.0
+
+
+def test_noise_and_a_vehicle_that_only_takes_off_have_no_pushes(study, nominal_flight, monkeypatch):
+    with_residual(monkeypatch, np.random.default_rng(0).normal(size=len(nominal_flight)))
+    taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
+    for one in (nominal_flight, taking_off):
+        assert push_gate(Data(study, [one])) == ((), 0.0)
 
 
 def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_flight, monkeypatch):

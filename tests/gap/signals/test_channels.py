@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airtouch.gap.flights.flight import PERIOD_S
-from airtouch.gap.signals.channels import FORCE, TORQUE, ReplayedFlight, inside, residual
+from airtouch.gap.signals.channels import FORCE, ONSET_S, TORQUE, ReplayedFlight, inside, residual, share_inside
 from airtouch.simulation.effects import Active, get
 from gap_flights import VEHICLE, flight
 
@@ -38,14 +38,28 @@ def test_a_gate_holds_the_samples_of_its_own_flight_from_each_beginning_to_befor
     np.testing.assert_array_equal(inside(GATE, flight(SECONDS)), within((1.0, 2.0), (3.5, 4.25)))
 
 
+def test_an_effect_sets_in_and_ceases_along_half_a_cosine_about_the_ends_of_its_gate():
+    """One half at the ends, all of it from half of ONSET_S inside, nothing from there outside; of one flight alone."""
+    hover, half = flight(SECONDS), 0.5 * ONSET_S
+    share = share_inside(GATE, hover)
+    np.testing.assert_array_equal(share == 1.0, within((1.0 + half, 2.0 - half + PERIOD_S),
+                                                       (3.5 + half, 4.25 - half + PERIOD_S)))
+    np.testing.assert_allclose(share[[100, 200, 350, 425]], 0.5)
+    np.testing.assert_allclose(share[100 - 7], 0.5 * (1.0 - np.sin(np.pi * 0.07 / ONSET_S)))
+    assert not share[:85].any() and not share[216:335].any() and not share[441:].any()
+    assert share_inside(GATE, replace(hover, name="another"))[100:500].all(), "its own stretch"
+    assert not share_inside(GATE, replace(hover, name="a third")).any()
+
+
 def test_a_gated_effect_acts_in_its_seconds_alone():
     """A vehicle heavier by a share is accelerated less by the same thrust T: by T / m (1 - 1 / (1 + share))."""
     hover = flight(SECONDS)
     without, gated = residual(hover, VEHICLE), residual(hover, VEHICLE, [heavier(0.2, GATE)])
-    acts = within((1.0, 2.0), (3.5, 4.25))
-    np.testing.assert_array_equal(gated[~acts], without[~acts])
+    share = share_inside(GATE, hover)
+    np.testing.assert_array_equal(gated[share == 0.0], without[share == 0.0])
     lift = 4.0 * VEHICLE.thrust(np.array([40000.0]))[0] / VEHICLE.mass_kg
-    np.testing.assert_allclose((gated - without)[acts, FORCE.stop - 1], lift * (1.0 - 1.0 / 1.2), rtol=1e-3)
+    expected = share * lift * (1.0 - 1.0 / 1.2)
+    np.testing.assert_allclose((gated - without)[:, FORCE.stop - 1], expected, atol=1e-3 * lift)
 
 
 def test_two_gated_effects_beside_one_that_always_acts_add_up_where_both_act():
@@ -54,7 +68,7 @@ def test_two_gated_effects_beside_one_that_always_acts_add_up_where_both_act():
     always = heavier(0.2)
     one = residual(hover, VEHICLE, [always, replace(early, gate=())]) - residual(hover, VEHICLE, [always])
     both = residual(hover, VEHICLE, [always, early, late]) - residual(hover, VEHICLE, [always])
-    count = within((1.0, 3.0)).astype(float) + within((2.0, 4.0))
+    count = share_inside(early.gate, hover) + share_inside(late.gate, hover)
     np.testing.assert_allclose(both[:, FORCE], count[:, None] * one[:, FORCE], atol=1e-12)
     assert np.abs(one[:, FORCE]).min(axis=0)[0] > 1e-3
 

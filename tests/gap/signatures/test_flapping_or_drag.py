@@ -73,6 +73,7 @@ def test_a_fit_tells_flapping_from_drag_by_its_moment_alone(study, tilt):
         return OVERLAP_WEIGHT * float(np.sum(squared(ours - theirs) / problem.elements.floor_power))
 
     (flapping,), (drag, *_) = candidates.terms("blade_flapping"), candidates.terms("rotor_drag")
+    flapping = replace(flapping, free=("tilt",))
     in_the_centre = replace(flapping, values={**flapping.values, **NO_MOMENT})
     whole, push = {"blade_flapping": {"tilt": tilt}}, {"blade_flapping": {"tilt": tilt, **NO_MOMENT}}
     as_drag = {"rotor_drag": {"horizontal": tilt * WEIGHT}}

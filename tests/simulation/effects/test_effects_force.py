@@ -181,6 +181,13 @@ def test_blade_flapping_tilts_the_thrust_back(signals):
     np.testing.assert_allclose(force, [-back, 0, 0, 0, -0.015 * back, 0], atol=1e-12)
 
 
+def test_blade_flapping_has_a_moment_without_a_force_too(signals):
+    """Over thrust and speed; negative, it lowers the nose: forward is x, so the torque about y is positive."""
+    signals[:, at.VELOCITY], signals[:, at.VELOCITY + 1] = 2.0, -1.0
+    moment = wrench("blade_flapping", {"tilt": 0.0, "moment": -3e-4}, signals)[0]
+    np.testing.assert_allclose(moment, MASS * GRAVITY * 3e-4 * np.array([0, 0, 0, 1.0, 2.0, 0]), atol=1e-12)
+
+
 def test_slung_load_hangs_and_swings_at_its_period(signals):
     signals = np.repeat(signals[:1], 15000, axis=0)
     signals[:, at.ACCELERATION] = np.where(np.arange(15000) < 50, 1.0, 0.0)  # a push sets it swinging

@@ -33,6 +33,14 @@ def test_every_effect_is_drawn_within_its_range_and_each_flight_has_a_seed_of_it
     assert [x.effect for x in drawn].count("none") == 5 and drawn[0].of("mass") == 0.0
 
 
+def test_other_effects_are_drawn_within_their_ranges_and_are_not_those_of_the_peers():
+    drawn = labels.labels_of(2, 1, 5, labels.OTHERS)
+    assert len(drawn) == 2 + 1 + 2 * 5 and not set(labels.OTHERS) & set(labels.STRENGTHS)
+    for name, (low, high, _) in labels.OTHERS.items():
+        strengths = [x.of(name) for x in drawn if x.effect == name]
+        assert len(strengths) == 2 and all(low <= s <= high for s in strengths)
+
+
 def test_pwm_is_the_inverse_of_the_thrust_curve(rotorpy, tmp_path):
     *_, vehicle = rotorpy
     pwm = np.array([1000.0, 20000.0, 40000.0, 65535.0])
@@ -94,6 +102,32 @@ def test_a_rotor_gains_by_the_share_of_its_disc_over_the_platform(rotorpy):
         counted = np.mean([drawn.surface(p) > 0.0 for p in x + 0.03 * inside])
         np.testing.assert_allclose(drawn.over_platform(np.array(x), 0.03), counted, atol=0.005)
     np.testing.assert_allclose(course.disc_beyond(np.array([-2.0, 0.0, 2.0])), [1.0, 0.5, 0.0], atol=1e-12)
+
+
+def test_lost_rows_are_a_share_in_bursts_of_two(rotorpy):
+    *_, flight, _ = rotorpy
+    lost = flight._lost(400_000, 0.08, np.random.default_rng(0))
+    begins = np.count_nonzero(np.diff(lost.astype(int)) > 0)
+    np.testing.assert_allclose([lost.mean(), lost.sum() / begins], [0.08, 2.0], rtol=0.03)
+    assert not flight._lost(1000, 0.0, np.random.default_rng(0)).any()
+
+
+def test_the_wake_is_that_of_gym_pybullet_drones(rotorpy):
+    """Its formula by hand, 1 m below: 2267.18 (R / 4)^2 on the axis, and a bell of width 0.16 - 0.11 m."""
+    *_, flight, _ = rotorpy
+    peak = 2267.18 * (0.0231348 / 4.0) ** 2
+    np.testing.assert_allclose([flight._wake(np.zeros(3)), flight._wake(np.array([0.03, 0.04, 0.3]))],
+                               [peak, peak * np.exp(-0.5)], rtol=1e-6)
+
+
+def test_rotors_flap_as_rotorpys(rotorpy):
+    """By hand: at strength 1 four rotors at 1,800 rad/s and 0.5 m/s forward lower the nose by 3.6e-5 N m."""
+    *_, vehicle = rotorpy
+    craft = vehicle.craft_of(labels.Label("x", "blade_flapping", 1.0, "", 1), np.array([1.0, 0.0, 0.0]))
+    craft.push = 0.05
+    force, torque = craft.compute_body_wrench(np.zeros(3), np.full(4, 1800.0), np.array([0.5, 0.0, 0.0]))
+    np.testing.assert_allclose(torque, [0.0, 4 * 1e-8 * 1800.0 * 0.5, 0.0], atol=1e-12)
+    np.testing.assert_allclose(force, [0.0, 0.0, 4 * 2.3e-8 * 1800.0 ** 2 - 0.05], atol=1e-12)
 
 
 @pytest.mark.parametrize("options", [("--seed", "1"), ("--slow-error", "0")])

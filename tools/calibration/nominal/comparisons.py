@@ -4,6 +4,7 @@ import multiprocessing
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from airtouch.gap.nominal.apparent import apparent_strengths, passing_sizes
 from airtouch.gap.signatures.scatter import ApparentStrengths
 from airtouch.gap.study import Study
 from airtouch.logs import json_lines
+from airtouch.simulation import effects
 from airtouch.vehicle import Vehicle
 
 from .groups import Group, Log
@@ -25,17 +27,19 @@ MOST = 5  #: baseline flights of one, at most; no source: round number, for time
 class Task(NamedTuple):
     """Flights of a group to be compared with `others`, of other groups of its drone; None: with those of the group.
 
-    passing: whether only passing effects are measured.
+    passing: whether only passing effects are measured; only: names of the effects that are, () for all.
     """
 
     group: Group
     others: list[Log] | None = None
     passing: bool = False
+    only: tuple[str, ...] = ()
 
     @property
     def note(self) -> str:
         """What is added to the names of the comparisons."""
-        return ", other groups" * (self.others is not None) + ", passing effects" * self.passing
+        return (", other groups" * (self.others is not None) + ", passing effects" * self.passing
+                + f", {' '.join(self.only)}" * bool(self.only))
 
 
 def compare_all(tasks: Sequence[Task], keep: Path | None, jobs: int) -> dict[str, dict]:
@@ -52,13 +56,16 @@ def compare_all(tasks: Sequence[Task], keep: Path | None, jobs: int) -> dict[str
     return row_of
 
 
-def tasks_of(groups: Sequence[Group]) -> list[Task]:
-    """Each group against itself and, where its drone has two or more flights in other groups, against those."""
+def tasks_of(groups: Sequence[Group], only: tuple[str, ...] = ()) -> list[Task]:
+    """Each group against itself and, where its drone has two or more flights in other groups, against those.
+
+    only: names of the effects that are measured, () for all.
+    """
     out = []
     for group in groups:
         others = [log for other in groups if other.drone == group.drone and other.name != group.name
                   for log in other.logs]
-        out += [Task(group), *([Task(group, others)] if len(others) > 1 else [])]
+        out += [Task(group, None, only=only), *([Task(group, others, only=only)] if len(others) > 1 else [])]
     return out
 
 
@@ -86,8 +93,9 @@ def _ready(logs: list[Log], vehicle: Vehicle) -> list[tuple[str, Flight]]:
 
 def _rows_of(task: Task) -> list[dict]:
     """The rows of a task's comparisons, one for each flight of the group; JSON-ready."""
+    without = [name for name in effects.NAMES if name not in task.only] if task.only else []
     comparisons = held_out(task.group.logs, task.group.vehicle, task.others,
-                           passing_alone if task.passing else apparent_strengths)
+                           passing_alone if task.passing else partial(apparent_strengths, without=without))
     return [{"file": name + task.note, "rate": apparent.rate, "passing": dict(apparent.passing),
              "strengths": {k: v.tolist() for k, v in apparent.strengths.items()},
              "errors": {k: v.tolist() for k, v in apparent.errors.items()}} for name, apparent in comparisons]

@@ -14,14 +14,17 @@ from .comparisons import Task
 from .groups import Group
 
 
-def scatter_of_classes(groups: Sequence[Group],
-                       row_of: Mapping[str, dict]) -> tuple[dict[str, Scatter], dict[str, str]]:
-    """Class -> its scatter, and class -> on how many flights it was measured, from the rows of `compare_all`."""
+def scatter_of_classes(groups: Sequence[Group], row_of: Mapping[str, dict], only: tuple[str, ...] = (),
+                       ) -> tuple[dict[str, Scatter], dict[str, str]]:
+    """Class -> its scatter, and class -> on how many flights it was measured, from the rows of `compare_all`.
+
+    only: names of the effects that were measured, () for all.
+    """
     flights, alike, names, flown_by = defaultdict(list), defaultdict(list), defaultdict(set), {}
     for group in groups:
         names[group.of].add(group.name)
         flown_by[group.of] = group.vehicle.name
-        for task in (Task(group), Task(group, [])):
+        for task in (Task(group, only=only), Task(group, [], only=only)):
             files = [name + task.note for name, _ in group.logs]
             for row in (row_of[file] for file in files if file in row_of):
                 flights[group.of].append(_apparent(row))
@@ -40,6 +43,12 @@ def with_passing(tasks: Sequence[Task], row_of: Mapping[str, dict]) -> dict[str,
     for task in tasks:
         flights[task.group.of] += [_apparent(row_of[name + task.note]) for name, _ in task.group.logs]
     return {of: replace(one, passing=class_scatter(flights[of]).passing) for of, one in table().items()}
+
+
+def with_effects(measured: Mapping[str, Scatter]) -> dict[str, Scatter]:
+    """The classes of the table that is shipped, with the strengths of some effects as measured anew."""
+    return {of: replace(one, rms={**one.rms, **measured[of].rms}, middle={**one.middle, **measured[of].middle})
+            for of, one in table().items()}
 
 
 def counts_of(text: str) -> dict[str, str]:

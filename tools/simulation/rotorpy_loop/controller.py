@@ -26,9 +26,10 @@ class Estimate(NamedTuple):
 
 
 class Controller:
-    """The loop of the nominal vehicle; its integrals are its state."""
+    """The loop; its integrals are its state. rate_factor: on the gains of the rates, 1 in the nominal vehicle."""
 
-    def __init__(self) -> None:
+    def __init__(self, rate_factor: float = 1.0) -> None:
+        self.rate_factor = rate_factor
         self.sum_velocity, self.sum_rate = np.zeros(3), np.zeros(3)
 
     def pwm(self, set_point: SetPoint, estimate: Estimate) -> np.ndarray:
@@ -42,7 +43,7 @@ class Controller:
         thrust = MASS_KG * np.clip(GRAVITY + acceleration[2], 2.0, 16.0) / upright
         rate_error = ANGLE_GAIN * (np.array([roll, pitch, 0.0]) - estimate.angles) - estimate.rates
         self.sum_rate = np.clip(self.sum_rate + rate_error * STEP_S, -MOST_SUM_RAD, MOST_SUM_RAD)
-        torque = np.array(INERTIA) * (RATE_GAIN * rate_error + RATE_INTEGRAL * self.sum_rate)
+        torque = self.rate_factor * np.array(INERTIA) * (RATE_GAIN * rate_error + RATE_INTEGRAL * self.sum_rate)
         r, p = torque[:2] / (ARM_M / np.sqrt(2.0))
         y = torque[2] / YAW_ARM_M
         return pwm_of_thrust(0.25 * (thrust + np.array([-r - p - y, -r + p + y, r + p - y, r - p + y])))

@@ -23,6 +23,10 @@ GYRO_OVER_ACC = 0.05  #: of a vibration, rad/s over m/s^2; chosen, as in FLIGHTS
 STANDING_M, ROTORS_M = 0.012, 0.02  #: range at rest, and height of the rotors over the vehicle's lowest point
 GROUND, RADIUS_M = 11.36859, 0.0231348  #: gym-pybullet-drones' ground effect: coefficient and rotor radius, m
 LEAST_M = 0.25 * RADIUS_M * np.sqrt(15.0 * GROUND / 4.0)  #: its least height of a rotor, 3.8 cm
+#: gym-pybullet-drones' wake of a vehicle that hovers so much higher, m, before the platform: its three coefficients
+WAKE, HIGHER_M, WAKE_X_M = (2267.18, 0.16, -0.11), 1.0, (0.2, 0.6)
+NOISE_S = 0.02  #: correlation time of motor noise, s; chosen
+BURST = 2.0  #: rows lost in a row, mean; chosen
 FALLEN_TILT_RAD = 1.0  #: beyond which a flight has failed
 COLUMNS = (*(f"acc_{a}_mps2" for a in "xyz"), *(f"gyro_{a}_radps" for a in "xyz"), *(f"m{i}_pwm" for i in (1, 2, 3, 4)),
            "zrange_m", *(f"v{a}_mps" for a in "xyz"), *(f"{a}_m" for a in "xyz"))
@@ -63,11 +67,13 @@ class Sensors:
 def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
     """The log of a flight; slow_error: factor on DRIFT. Raises AirTouchError where the vehicle falls."""
     rng = np.random.default_rng(label.seed)
-    course, controller = Course(rng), Controller()
+    course, controller = Course(rng), Controller(label.of("controller_gain") or 1.0)
     heading = rng.uniform(0.0, 2.0 * np.pi)
     craft = craft_of(label, np.array([np.cos(heading), np.sin(heading), 0.0]))
     rotor_factors = np.full(4, 1.0 - label.of("thrust_coeff"))
     rotor_factors[rng.integers(4)] -= label.of("weak_motor")
+    others = np.random.default_rng([label.seed, 1])  # of effects that came later: the flights before stay as they were
+    wake_x_m, motor_noise = others.uniform(*WAKE_X_M), np.zeros(4)
     sensors, state = Sensors(label, slow_error, rng), craft.initial_state
     delay, latency = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))  # steps
     commands, estimates, rows, resting = [np.zeros(4)] * (delay + 1), [], [], True
@@ -84,6 +90,11 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
         craft.factor = rotor_factors * (1.0 - sag)
         if strength := label.of("ground_effect"):
             craft.factor *= 1.0 + strength * _lift(craft, state, rotation, course)
+        if rms := label.of("motor_noise"):
+            fade = STEP_S / NOISE_S
+            motor_noise = (1.0 - fade) * motor_noise + np.sqrt(2.0 * fade) * rms * others.standard_normal(4)
+            craft.factor *= np.maximum(1.0 + motor_noise, 0.0)
+        craft.push = label.of("downwash") * _wake(state["x"] - (wake_x_m, 0.0, 0.0))
         if gust := label.of("gust"):
             fade = STEP_S / GUST_S
             state["wind"] = (1.0 - fade) * state["wind"] + np.sqrt(2.0 * fade) * gust * GUST_SHARE \
@@ -95,14 +106,30 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
                       "q": Rotation.from_euler("Z", yaw).as_quat()}
         if not max(abs(roll), abs(pitch)) < FALLEN_TILT_RAD:
             raise AirTouchError(f"{label.file}: falls at {t:.1f} s ({label.effect} {label.strength:.3g})")
-    return _log(np.array(rows), label, rng)
+    return _log(np.array(rows), label, rng, others)
 
 
-def _log(table: np.ndarray, label: Label, rng: np.random.Generator) -> FlightLog:
-    """The log of a table (rows, columns), with the times as they were logged."""
+def _log(table: np.ndarray, label: Label, rng: np.random.Generator, others: np.random.Generator) -> FlightLog:
+    """The log of a table (rows, columns), with the times as they were logged and without the rows that were lost."""
     late = 0.001 * label.of("time_jitter") * rng.standard_normal(len(table))
     times = np.maximum.accumulate(ROWS * STEP_S * np.arange(len(table)) + late - min(late[0], 0.0))
-    return FlightLog({"t_s": times, **{name: table[:, i] for i, name in enumerate(COLUMNS)}})
+    kept = ~_lost(len(table), label.of("packet_loss"), others)
+    return FlightLog({"t_s": times[kept], **{name: table[kept, i] for i, name in enumerate(COLUMNS)}})
+
+
+def _lost(n: int, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Which of n rows are lost, bool (n,): a share of them, in bursts of BURST rows in the mean."""
+    begin, lost = share / (1.0 - share) / BURST, [False]
+    for u in rng.random(n - 1):
+        lost.append(bool(u > 1.0 / BURST) if lost[-1] else bool(u < begin))
+    return np.array(lost)
+
+
+def _wake(place: np.ndarray) -> float:
+    """Push, N, of the wake of a vehicle that hovers HIGHER_M above a hover at the origin; place (3,): m."""
+    strength, wider, width = WAKE
+    peak = strength * (RADIUS_M / (4.0 * HIGHER_M)) ** 2
+    return float(peak * np.exp(-0.5 * (np.hypot(*place[:2]) / (wider * HIGHER_M + width)) ** 2))
 
 
 def _speeds(craft: Craft, pwm: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The flights to make: the effect in each, and how strong it is."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,12 @@ STRENGTHS = {
     "mass": (0.08, 0.16, "fraction more"),
     "battery_sag": (0.08, 0.15, "thrust lost at the end"), "vibration": (0.8, 2.0, "m/s^2 peak on each axis"),
     "ground_effect": (0.6, 1.4, "x formula"), "time_jitter": (2.0, 4.0, "ms rms"),
+}
+#: the same of effects that those flights lack; chosen
+OTHERS = {
+    "blade_flapping": (0.5, 1.5, "x 1e-8 N m per rad/s and m/s"), "motor_noise": (0.02, 0.05, "rms of a rotor's thrust"),
+    "packet_loss": (0.05, 0.12, "rows lost"), "controller_gain": (0.55, 0.75, "x rate gains"),
+    "downwash": (1.0, 2.0, "x formula"),
 }
 SEEDS = 1000  #: of one set, so that no flight is in two
 FIRST_BASELINE_SEED = 900  #: among these; those of the cases are below it
@@ -38,16 +45,17 @@ class Label:
         return self.strength if effect == self.effect else 0.0
 
 
-def labels_of(each: int, nominal: int, seed: int) -> list[Label]:
+def labels_of(each: int, nominal: int, seed: int,
+              strengths: Mapping[str, tuple[float, float, str]] = STRENGTHS) -> list[Label]:
     """Two flights for the baseline, so many with each effect and so many without any, in a drawn order.
 
-    Raises AirTouchError for more flights than a set has seeds.
+    strengths: of the effects, STRENGTHS or OTHERS. Raises AirTouchError for more flights than a set has seeds.
     """
-    if each * len(STRENGTHS) + nominal > FIRST_BASELINE_SEED:
+    if each * len(strengths) + nominal > FIRST_BASELINE_SEED:
         raise AirTouchError(f"--each and --nominal make more than {FIRST_BASELINE_SEED} flights; ask for fewer")
     rng = np.random.default_rng(seed)
     cases: list[tuple[str, float, str]] = [("none", 0.0, "")] * nominal
-    cases += [(name, float(rng.uniform(low, high)), unit) for name, (low, high, unit) in STRENGTHS.items()
+    cases += [(name, float(rng.uniform(low, high)), unit) for name, (low, high, unit) in strengths.items()
               for _ in range(each)]
     first = SEEDS * seed
     baseline = [Label(f"cal_A_{i}.csv.gz", "none", 0.0, "", first + FIRST_BASELINE_SEED + i) for i in (0, 1)]

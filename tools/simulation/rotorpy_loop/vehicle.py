@@ -15,6 +15,7 @@ ARM_M = float(np.linalg.norm(quad_params["rotor_pos"]["r1"]))
 YAW_ARM_M = quad_params["k_m"] / quad_params["k_eta"]
 GRAVITY = 9.81
 LAG_S = 0.03  #: chosen; RotorPy's is 0.072
+FLAPPING = 1e-8  #: of RotorPy's flapping moment at strength 1, N m per rad/s and m/s
 C0, C1, C2 = 5.484560e-4, 1.032633e-6, 2.130295e-11  #: thrust of a motor, N: c0 + c1 p + c2 p^2 of PWM p; chosen
 ACC_NOISE, GYRO_NOISE, RANGE_NOISE = 0.06, 0.006, 0.002  #: rms: m/s^2, rad/s, m
 FILE = f"""# Body of RotorPy 3.0's Crazyflie; motor lag, thrust curve, rotor radius and noise chosen, no drag
@@ -37,14 +38,16 @@ ORDER = [1, 2, 3, 0]  #: RotorPy's rotors front left, front right, rear right, r
 
 
 class Craft(Multirotor):
-    """RotorPy's vehicle with a factor (4,) on the thrust of each rotor, in RotorPy's order."""
+    """RotorPy's vehicle with a factor (4,) on the thrust of each rotor, in RotorPy's order, and a push from above, N."""
 
-    factor = np.ones(4)
+    factor, push = np.ones(4), 0.0
 
     def compute_body_wrench(self, body_rates: np.ndarray, rotor_speeds: np.ndarray,
                             body_airspeed_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """RotorPy's wrench at the rotor speeds that give such thrusts."""
-        return super().compute_body_wrench(body_rates, rotor_speeds * np.sqrt(self.factor), body_airspeed_vector)
+        """RotorPy's wrench at the rotor speeds that give such thrusts, and the push along the body's axis."""
+        speeds = rotor_speeds * np.sqrt(self.factor)
+        force, torque = super().compute_body_wrench(body_rates, speeds, body_airspeed_vector)
+        return force - (0.0, 0.0, self.push), torque
 
 
 def craft_of(label: Label, direction: np.ndarray) -> Craft:
@@ -60,6 +63,7 @@ def craft_of(label: Label, direction: np.ndarray) -> Craft:
     in_wind = bool(label.of("wind") or label.of("gust"))
     drag = label.of("rotor_drag") or float(in_wind)  # none in the nominal vehicle
     p["k_d"], p["k_z"] = drag * p["k_d"], drag * p["k_z"]
+    p["k_flap"] = FLAPPING * label.of("blade_flapping")
     p["rotor_pos"] = {k: r - 0.001 * label.of("com_offset") * direction for k, r in p["rotor_pos"].items()}
     state = {"x": np.zeros(3), "v": np.zeros(3), "q": np.array([0.0, 0.0, 0.0, 1.0]), "w": np.zeros(3),
              "wind": label.of("wind") * direction, "rotor_speeds": np.zeros(4)}

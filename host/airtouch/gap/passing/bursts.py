@@ -13,9 +13,11 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.passing.gate_search import ENDS, LEAST_BLOCKS, MOST_OF_FLIGHTS, best_intervals, interval_cost
+from airtouch.gap.passing.gate_search import ENDS, LEAST_BLOCKS, MOST_INTERVALS, MOST_OF_FLIGHTS, best_intervals, interval_cost
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.study import Study
+from airtouch.logs.segments import runs
+from airtouch.robust import deviation
 from airtouch.simulation.effects.effect import Gate
 
 
@@ -44,6 +46,9 @@ SHAKE_BAND_HZ, SHAKE_PIECE_S = (15.0, 40.0), 0.32
 FORCE_BURSTS = BurstSignal(COLUMN["force_z"], (1.0, 50.0), 0.16, 3.0)
 #: freedom: twice the band's width times the piece's length
 YAW_BURSTS = BurstSignal(COLUMN["torque_z"], SHAKE_BAND_HZ, SHAKE_PIECE_S, 16.0)
+#: band, Hz, of single pushes, and robust standard deviations of the flight that the strongest has at least; both chosen.
+#: A lower upper end makes short pushes longer, a smaller number tries more gates of noise
+PUSH_BAND_HZ, PUSH_OVER = (0.1, 5.0), 5.0
 #: pieces in the air, below which no burst is sought and no flight is unsteady; chosen. A larger number says nothing of
 #: short flights
 LEAST_PIECES = 2 * LEAST_BLOCKS
@@ -64,6 +69,29 @@ def burst_gate(data: Data, signal: BurstSignal) -> tuple[Gate, float]:
         cost += interval_cost(known) * len(intervals)
     duration_s = sum(end - begin for _, begin, end in gate)
     return ((), 0.0) if duration_s > MOST_OF_FLIGHTS * judged_s else (tuple(gate), cost)
+
+
+def push_gate(data: Data) -> tuple[Gate, float]:
+    """The pushes along the thrust of at least half of the strongest, in all flights, and nats that their choice costs.
+
+    None where the strongest is not PUSH_OVER robust standard deviations of the flight. At most MOST_INTERVALS a flight.
+    """
+    gate: list[tuple[str, float, float]] = []
+    cost = 0.0
+    for flight in data.flights:
+        force, counts = residual_in_band(data.study, flight, FORCE_BURSTS.column, PUSH_BAND_HZ)
+        pieces = int(counts.sum() * PERIOD_S / FORCE_BURSTS.piece_s)
+        if pieces < LEAST_PIECES:
+            continue
+        push = np.where(counts, force - np.median(force[counts]), 0.0)
+        strongest = push[np.argmax(np.abs(push))]
+        if abs(strongest) < PUSH_OVER * deviation(push[counts]):
+            continue
+        stretches = runs(push / strongest > 0.5)
+        highest = sorted(stretches, key=lambda run: -np.max(push[slice(*run)] / strongest))[:MOST_INTERVALS]
+        gate += [(flight.name, a * PERIOD_S, b * PERIOD_S) for a, b in sorted(highest)]
+        cost += interval_cost(pieces) * len(highest)
+    return tuple(gate), cost
 
 
 def residual_in_band(study: Study, flight: Flight, column: int, band_hz: tuple[float, float],

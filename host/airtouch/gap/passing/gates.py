@@ -15,7 +15,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import FittedTerms, fit
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import BlockSet, whole_of
-from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate
+from airtouch.gap.passing.bursts import FORCE_BURSTS, YAW_BURSTS, burst_gate, push_gate
 from airtouch.gap.passing.gate_search import LEAST_BLOCKS, GateTrial, block_gate, block_log_likelihoods
 from airtouch.gap.signatures import candidates
 from airtouch.gap.signatures.candidates import random_of
@@ -82,7 +82,8 @@ def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, Passin
     base = no_effect(data)
     if base is None:
         return {}
-    burst_gates, out = [burst_gate(data, signal) for signal in (FORCE_BURSTS, YAW_BURSTS)], {}
+    burst_gates = [*(burst_gate(data, signal) for signal in (FORCE_BURSTS, YAW_BURSTS)), push_gate(data)]
+    out: dict[str, PassingEffect] = {}
     for name, variants in candidates.passing_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best_variant(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)

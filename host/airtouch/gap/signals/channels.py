@@ -53,6 +53,9 @@ CHANNEL_WORDS = {
 }
 FORCE, TORQUE, RATE, COMMAND = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
 COUNT = len(CHANNELS)  #: of a table with a column for each channel
+#: s in which a passing effect sets in, and ceases: a vehicle at 0.4 m/s flies in or out of a wake that is 0.1 m wide.
+#: Chosen among 0, 0.1, 0.2, 0.3 and 0.45 on wakes of recorded flights (host/docs/looks.md, 2026-11-28 21:12)
+ONSET_S = 0.3
 KEPT_RESIDUALS = 12  #: residuals of one flight that are cached for gates to be put together from; chosen
 
 
@@ -62,6 +65,20 @@ def inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarr
     out = np.zeros(len(flight), bool)
     for name, begin, end in gate:
         out |= (name == flight.name) & (t >= begin) & (t < end)
+    return out
+
+
+def share_inside(gate: Sequence[tuple[str, float, float]], flight: Flight) -> np.ndarray:
+    """Share (n,), 0 to 1, with which an effect in a gate acts at the samples of a flight.
+
+    At the ends of a stretch it is one half. It rises and falls along half a cosine that lasts ONSET_S.
+    """
+    t = np.arange(len(flight)) * PERIOD_S
+    out = np.zeros(len(flight))
+    for name, begin, end in gate:
+        if name == flight.name:
+            within = np.clip(np.minimum(t - begin, end - t) / ONSET_S + 0.5, 0.0, 1.0)
+            out = np.maximum(out, 0.5 - 0.5 * np.cos(np.pi * within))
     return out
 
 
@@ -98,16 +115,18 @@ class ReplayedFlight:
     def residual(self, active: Sequence[Active] = ()) -> np.ndarray:
         """The function `residual`, as a new array.
 
-        A passing effect adds in its seconds what it adds there when it always acts.
+        A passing effect adds in its seconds what it adds there when it always acts, times `share_inside`.
         """
         gated, always = [a for a in active if a.gate], [a for a in active if not a.gate]
         if not gated:
             return self._ungated(active)
         out = self._cached(always).copy()
         for a in gated:
-            acts = inside(a.gate, self.flight)
+            share = share_inside(a.gate, self.flight)
+            acts = share > 0.0
             if acts.any():
-                out[acts] += self._cached([*always, replace(a, gate=())])[acts] - self._cached(always)[acts]
+                added = self._cached([*always, replace(a, gate=())])[acts] - self._cached(always)[acts]
+                out[acts] += share[acts, None] * added
         return out
 
     def _cached(self, active: Sequence[Active]) -> np.ndarray:

@@ -141,11 +141,14 @@ def _of_hidden(update: Update) -> dict[str, np.ndarray]:
 
 
 def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Scatter by effect, in which names of one thing in the logs, as mass and thrust, have the wider of theirs."""
+    """Scatter by effect, in which names of one thing in the logs, as mass and thrust, have the wider of theirs.
+
+    Those of several parameters keep their own: these are not the same one by one.
+    """
     out = dict(rms)
     for confusion in ALIKE:
         same = [out[n] for n in confusion.effects if n in out]
-        if len({len(x) for x in same}) == 1:
+        if {len(x) for x in same} == {1}:
             out |= {n: np.max(same, axis=0) for n in confusion.effects if n in out}
     return out
 

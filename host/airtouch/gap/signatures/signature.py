@@ -152,7 +152,7 @@ SIGNATURES: dict[str, Signature] = {
     "gust": Signature(
         ("rms",), SPECTRUM, _each("length", 0.2, 0.5, 1.5), class_by="length", may_pass=True,
         companion="rotor_drag"),
-    "blade_flapping": Signature(("tilt",)),
+    "blade_flapping": Signature(("tilt", "moment")),
     "motor_lag": Signature(("factor",), factors=True),
     "motor_noise": Signature(
         ("rms",), SPECTRUM, _each("time", 0.005, 0.02, 0.1), class_by="time", spectrum=THRUST_NOISE),

@@ -3,9 +3,11 @@
 from contextlib import nullcontext
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from airtouch.gap.signatures.scatter import ApparentStrengths, Scatter
+from airtouch.simulation import effects
 from tools.calibration.nominal import comparisons, scatter_table
 from tools.calibration.nominal.groups import Group
 
@@ -89,3 +91,23 @@ def test_passing_effects_are_those_of_each_flight_against_the_others_of_its_grou
         assert [row["passing"]["gust"] for row in rows.values()] == [1.0, 2.0, 3.0, 4.0, 5.0]
     assert compared == [("a0", ["a1", "a2"]), ("a1", ["a0", "a2"]), ("a2", ["a0", "a1"]),
                         ("b0", ["b1"]), ("b1", ["b0"])]
+
+
+def test_some_effects_alone_are_measured_anew_and_the_rest_of_the_table_stays(compared, monkeypatch):
+    """Every effect but these is left out of each comparison, in both kinds of which they are looked for."""
+    looked = []
+    monkeypatch.setattr(comparisons, "apparent_strengths", lambda data, without: looked.append(without) or
+                        ApparentStrengths({"mass": np.array([len(looked)])}, {"mass": np.zeros(1)}, 0.0))
+    one, other = group("a", "one", 2), group("b", "one", 2)
+    tasks = comparisons.tasks_of([one, other], ("mass",))
+    rows = {row["file"]: row for task in tasks for row in comparisons._rows_of(task)}
+    assert set(rows) == {f"{name}{note}" for name in ("a0", "a1", "b0", "b1")
+                         for note in (", mass", ", other groups, mass")}
+    assert all(set(without) == set(effects.NAMES) - {"mass"} for without in looked) and len(looked) == 8
+    measured, _ = scatter_table.scatter_of_classes([one, other], rows, ("mass",))
+    monkeypatch.setattr(scatter_table, "table", lambda: {"class": Scatter(
+        {"mass": np.ones(1), "wind": np.full(3, 2.0)}, 5.0, (0.1, 0.2), {"gust": (0.0, 1.0)})})
+    anew = scatter_table.with_effects(measured)["class"]
+    np.testing.assert_allclose(anew.rms["mass"], np.sqrt(np.mean(np.arange(1.0, 9.0) ** 2)), rtol=0.05)  # on a grid
+    assert anew.rms["wind"].tolist() == [2.0] * 3 and (anew.freedom, anew.rate) == (5.0, (0.1, 0.2))
+    assert anew.passing == {"gust": (0.0, 1.0)}

@@ -3,7 +3,7 @@
 from airtouch.simulation import signals as at
 from airtouch.simulation.effects.effect import Effect, Parameter, wrench
 
-TILT, HUB, ABOVE = range(3)
+TILT, HUB, ABOVE, MOMENT = range(4)
 
 
 @wrench
@@ -13,8 +13,8 @@ def blade_flapping(p, s, memory, generator, out):
     out[0] -= thrust * back_x
     out[1] -= thrust * back_y
     # the force acts at the discs above the centre of mass, and stiff hubs hand on the blades' moment
-    out[3] += (p[ABOVE] + p[HUB]) * thrust * back_y
-    out[4] -= (p[ABOVE] + p[HUB]) * thrust * back_x
+    out[3] += thrust * ((p[ABOVE] + p[HUB]) * back_y + p[MOMENT] * s[at.VELOCITY + 1])
+    out[4] -= thrust * ((p[ABOVE] + p[HUB]) * back_x + p[MOMENT] * s[at.VELOCITY])
 
 
 EFFECT = Effect(
@@ -24,5 +24,7 @@ EFFECT = Effect(
      Parameter("hub", "m", 0.005, 0.0, 0.1, None,
                "moment of the stiff hub over the disc's horizontal force", "guess"),
      Parameter("above", "m", 0.01, -0.05, 0.2, None, "discs above the centre of mass",
-               "Crazyflie 2.1, measured on drawings")),
+               "Crazyflie 2.1, measured on drawings"),
+     Parameter("moment", "s", 0.0, -0.02, 0.02, 0.0,
+               "moment without a force, over thrust and speed; negative: it lowers the nose, as RotorPy's k_flap")),
     wrench=blade_flapping)
