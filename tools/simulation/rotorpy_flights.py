@@ -6,7 +6,7 @@
 Each flight takes off, hovers, passes over a platform, hovers and lands, with one effect or none; its motors run on for
 a second or two while it stands. Body and the laws of motor lag and drag are RotorPy's, the rest is added
 (tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate on, the flights and a manifest.csv of
-the effect in each. Flights that are there already are kept, so that a stopped run goes on; a set of other options needs
+the effect in each. --others: flights with other effects, which FLIGHTS/peers lacks. Flights that are there already are kept, so that a stopped run goes on; a set of other options needs
 another OUT. A flight in which the vehicle falls is left out of the manifest, with an error at the end. Needs the extra
 `bench`. host/docs/gap-real.md has the figures.
 """
@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--seed", type=whole_number(0), default=0, help="of all that is drawn (default %(default)s)")
     parser.add_argument("--slow-error", type=factor, default=1.0, metavar="FACTOR",
                         help="on the slow error of position and velocity, 4 mm and 2 cm/s rms (default %(default)s)")
-    parser.add_argument("--others", action="store_true", help="effects that FLIGHTS/peers lacks, instead of those there")
+    parser.add_argument("--others", action="store_true", help="effects that FLIGHTS/peers lacks, not those there")
     options = parser.parse_args()
     labels = labels_of(options.each, options.nominal, options.seed, OTHERS if options.others else STRENGTHS)
     text = manifest(labels, options.slow_error)

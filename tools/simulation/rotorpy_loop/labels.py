@@ -22,7 +22,8 @@ STRENGTHS = {
 }
 #: the same of effects that those flights lack; chosen
 OTHERS = {
-    "blade_flapping": (0.5, 1.5, "x 1e-8 N m per rad/s and m/s"), "motor_noise": (0.02, 0.05, "rms of a rotor's thrust"),
+    "blade_flapping": (0.5, 1.5, "x 1e-8 N m per rad/s and m/s"),
+    "motor_noise": (0.02, 0.05, "rms of a rotor's thrust"),
     "packet_loss": (0.05, 0.12, "rows lost"), "controller_gain": (0.55, 0.75, "x rate gains"),
     "downwash": (1.0, 2.0, "x formula"),
 }

@@ -38,7 +38,7 @@ ORDER = [1, 2, 3, 0]  #: RotorPy's rotors front left, front right, rear right, r
 
 
 class Craft(Multirotor):
-    """RotorPy's vehicle with a factor (4,) on the thrust of each rotor, in RotorPy's order, and a push from above, N."""
+    """RotorPy's vehicle, for each rotor a factor (4,) on its thrust, in RotorPy's order, and a push from above, N."""
 
     factor, push = np.ones(4), 0.0
 

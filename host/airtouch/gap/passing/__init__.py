@@ -6,6 +6,7 @@ The words of this room:
   effect has them as `seconds`.
 - **interval**: one of these: (flight, from_s, to_s), or first and last block or piece.
 - **burst**: an interval in which a signal is far stronger than in the rest of the flight, whatever shakes it.
+- **push**: an interval in which the force along the thrust is at least half of the flight's strongest.
 - **piece**: the fraction of a second whose power tells a burst. A **block**, of which one spectrum is taken, is longer.
 
 Which file does what:

@@ -1,8 +1,9 @@
-"""Gates of bursts: the intervals in which a vehicle is shaken far more than in the rest of the flight.
+"""Gates of bursts and of pushes: intervals in which a vehicle is shaken or pushed far more than in all the rest.
 
 A wake that is flown through lasts shorter than a block, and the spectra of blocks would not show when. Two signals
 show it: the force along the thrust, and the yaw torque above the band in which the vehicle is steered. Rotors in a wake
-draw an unsteady torque, and commands hardly move the yaw axis that fast.
+draw an unsteady torque, and commands hardly move the yaw axis that fast. A smooth push shakes nothing: its interval is
+the one in which the force is at least half of its peak.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,14 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.filters import both_ways, highpass, lowpass
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.missing import interpolate_missing
-from airtouch.gap.passing.gate_search import ENDS, LEAST_BLOCKS, MOST_INTERVALS, MOST_OF_FLIGHTS, best_intervals, interval_cost
+from airtouch.gap.passing.gate_search import (
+    ENDS,
+    LEAST_BLOCKS,
+    MOST_INTERVALS,
+    MOST_OF_FLIGHTS,
+    best_intervals,
+    interval_cost,
+)
 from airtouch.gap.signals.channels import COLUMN, residual
 from airtouch.gap.study import Study
 from airtouch.logs.segments import runs
@@ -46,9 +54,9 @@ SHAKE_BAND_HZ, SHAKE_PIECE_S = (15.0, 40.0), 0.32
 FORCE_BURSTS = BurstSignal(COLUMN["force_z"], (1.0, 50.0), 0.16, 3.0)
 #: freedom: twice the band's width times the piece's length
 YAW_BURSTS = BurstSignal(COLUMN["torque_z"], SHAKE_BAND_HZ, SHAKE_PIECE_S, 16.0)
-#: band, Hz, of single pushes, and robust standard deviations of the flight that the strongest has at least; both chosen.
-#: A lower upper end makes short pushes longer, a smaller number tries more gates of noise
-PUSH_BAND_HZ, PUSH_OVER = (0.1, 5.0), 5.0
+#: band, Hz, of single pushes, and robust standard deviations of the flight that the strongest has at least; chosen. A
+#: lower upper end makes short pushes longer, a smaller number tries more gates of noise
+SINGLE_BAND_HZ, SINGLE_OVER = (0.1, 5.0), 5.0
 #: pieces in the air, below which no burst is sought and no flight is unsteady; chosen. A larger number says nothing of
 #: short flights
 LEAST_PIECES = 2 * LEAST_BLOCKS
@@ -74,18 +82,19 @@ def burst_gate(data: Data, signal: BurstSignal) -> tuple[Gate, float]:
 def push_gate(data: Data) -> tuple[Gate, float]:
     """The pushes along the thrust of at least half of the strongest, in all flights, and nats that their choice costs.
 
-    None where the strongest is not PUSH_OVER robust standard deviations of the flight. At most MOST_INTERVALS a flight.
+    They point the same way, and each lasts as long as it is so strong; MOST_INTERVALS a flight at most. None where the
+    strongest is less than SINGLE_OVER robust standard deviations of the flight.
     """
     gate: list[tuple[str, float, float]] = []
     cost = 0.0
     for flight in data.flights:
-        force, counts = residual_in_band(data.study, flight, FORCE_BURSTS.column, PUSH_BAND_HZ)
+        force, counts = residual_in_band(data.study, flight, FORCE_BURSTS.column, SINGLE_BAND_HZ)
         pieces = int(counts.sum() * PERIOD_S / FORCE_BURSTS.piece_s)
         if pieces < LEAST_PIECES:
             continue
         push = np.where(counts, force - np.median(force[counts]), 0.0)
         strongest = push[np.argmax(np.abs(push))]
-        if abs(strongest) < PUSH_OVER * deviation(push[counts]):
+        if abs(strongest) < SINGLE_OVER * deviation(push[counts]):
             continue
         stretches = runs(push / strongest > 0.5)
         highest = sorted(stretches, key=lambda run: -np.max(push[slice(*run)] / strongest))[:MOST_INTERVALS]

@@ -1,9 +1,9 @@
 """Passing effects: what each explains within its gate.
 
-An effect is tried in the gate of the blocks that it explains best (`gate_search`) and in those of bursts, which are
-shorter than a block (`bursts`). A gate may lie in one half of a split, so a passing effect is judged on what it is
-fitted on, at the cost of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of the
-choice of its gate.
+An effect is tried in the gate of the blocks that it explains best (`gate_search`) and in those of bursts and pushes,
+which are shorter than a block (`bursts`). A gate may lie in one half of a split, so a passing effect is judged on what
+it is fitted on, at the cost of half the logarithm of the number of blocks for each parameter (Schwarz 1978), and of
+the choice of its gate.
 """
 
 from collections.abc import Mapping, Sequence
@@ -82,21 +82,21 @@ def passing_effects(data: Data, without: Sequence[str] = ()) -> dict[str, Passin
     base = no_effect(data)
     if base is None:
         return {}
-    burst_gates = [*(burst_gate(data, signal) for signal in (FORCE_BURSTS, YAW_BURSTS)), push_gate(data)]
+    short_gates = [*(burst_gate(data, signal) for signal in (FORCE_BURSTS, YAW_BURSTS)), push_gate(data)]
     out: dict[str, PassingEffect] = {}
     for name, variants in candidates.passing_variants(without).items():
         if name == OVERHEAD and data.study.overhead:
             out[KNOWN_OVERHEAD] = replace(_best_variant(base, name, variants, data.study.overhead), key=KNOWN_OVERHEAD)
-        effects = [_fitted_in_gate(base, name, trial) for v in variants for trial in _trials(base, v, burst_gates)]
+        effects = [_fitted_in_gate(base, name, trial) for v in variants for trial in _trials(base, v, short_gates)]
         if effects:
             out[name] = max(effects, key=lambda effect: effect.gain)
     return out
 
 
-def _trials(base: NoEffect, terms: Sequence[Term], burst_gates: Sequence[tuple[Gate, float]]) -> list[GateTrial]:
-    """An effect in the blocks that it explains best and in the bursts of each signal, as far as there are any."""
+def _trials(base: NoEffect, terms: Sequence[Term], short_gates: Sequence[tuple[Gate, float]]) -> list[GateTrial]:
+    """An effect in the blocks that it explains best, in bursts and in pushes, as far as there are any."""
     trials = [block_gate(base.data, base.whole, base.block_log_likelihoods, terms),
-              *(GateTrial(terms, gate, cost) for gate, cost in burst_gates)]
+              *(GateTrial(terms, gate, cost) for gate, cost in short_gates)]
     return [trial for trial in trials if trial.gate]
 
 
