@@ -6,9 +6,13 @@
 Each flight takes off, hovers, passes over a platform, hovers and lands, with one effect or none; its motors run on for
 a second or two while it stands. Body and the laws of motor lag and drag are RotorPy's, the rest is added
 (tools/simulation/rotorpy_loop). OUT gets a vehicle file, two flights to calibrate on, the flights and a manifest.csv of
-the effect in each. --others: flights with other effects, which FLIGHTS/peers lacks. Flights that are there already are kept, so that a stopped run goes on; a set of other options needs
+the effect in each. Flights that are there already are kept, so that a stopped run goes on; a set of other options needs
 another OUT. A flight in which the vehicle falls is left out of the manifest, with an error at the end. Needs the extra
 `bench`. host/docs/gap-real.md has the figures.
+
+    python tools/simulation/rotorpy_flights.py OUT --others --each 4 --nominal 10 --seed 6
+
+--others: flights with five effects that FLIGHTS/peers lacks.
 """
 
 import argparse
