@@ -79,11 +79,13 @@ def test_pushes_are_those_of_half_the_strongest_at_least(study, nominal_flight, 
     assert cost > 0.0
 
 
-def test_noise_and_a_vehicle_that_only_takes_off_have_no_pushes(study, nominal_flight, monkeypatch):
-    with_residual(monkeypatch, np.random.default_rng(0).normal(size=len(nominal_flight)))
+def test_noise_and_nothing_and_a_vehicle_that_only_takes_off_have_no_pushes(study, nominal_flight, monkeypatch):
     taking_off = replace(nominal_flight, phase=np.full(len(nominal_flight), ENDS[0]))
-    for one in (nominal_flight, taking_off):
-        assert push_gate(Data(study, [one])) == ((), 0.0)
+    noise = np.random.default_rng(0).normal(size=len(nominal_flight))
+    for values in (noise, np.zeros(len(nominal_flight))):
+        with_residual(monkeypatch, values)
+        for one in (nominal_flight, taking_off):
+            assert push_gate(Data(study, [one])) == ((), 0.0)
 
 
 def test_what_stands_on_the_ground_is_no_part_of_the_median(study, nominal_flight, monkeypatch):

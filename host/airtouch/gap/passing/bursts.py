@@ -83,7 +83,7 @@ def push_gate(data: Data) -> tuple[Gate, float]:
     """The pushes along the thrust of at least half of the strongest, in all flights, and nats that their choice costs.
 
     They point the same way, and each lasts as long as it is so strong; MOST_INTERVALS a flight at most. None where the
-    strongest is less than SINGLE_OVER robust standard deviations of the flight.
+    strongest is no more than SINGLE_OVER robust standard deviations of the flight.
     """
     gate: list[tuple[str, float, float]] = []
     cost = 0.0
@@ -94,7 +94,7 @@ def push_gate(data: Data) -> tuple[Gate, float]:
             continue
         push = np.where(counts, force - np.median(force[counts]), 0.0)
         strongest = push[np.argmax(np.abs(push))]
-        if abs(strongest) < SINGLE_OVER * deviation(push[counts]):
+        if abs(strongest) <= SINGLE_OVER * deviation(push[counts]):
             continue
         stretches = runs(push / strongest > 0.5)
         highest = sorted(stretches, key=lambda run: -np.max(push[slice(*run)] / strongest))[:MOST_INTERVALS]
