@@ -62,12 +62,10 @@ def main() -> None:
     if args.passing:
         tasks = [Task(group, passing=True) for group in large_enough]
         text = text_of(with_passing(tasks, compare_all(tasks, args.keep, args.jobs)), counts)
-    elif only:
-        row_of = compare_all(tasks_of(large_enough, only), args.keep, args.jobs)
-        text = text_of(with_effects(scatter_of_classes(large_enough, row_of, only)[0]), counts)
     else:
-        row_of = compare_all(tasks_of(large_enough), args.keep, args.jobs)
-        text = text_of(*scatter_of_classes(large_enough, row_of))
+        row_of = compare_all(tasks_of(large_enough, only), args.keep, args.jobs)
+        measured, new_counts = scatter_of_classes(large_enough, row_of, only)
+        text = text_of(with_effects(measured), counts) if only else text_of(measured, new_counts)
     write_bytes(text.encode(), args.out, args.force)
     print(text)
 

@@ -106,10 +106,10 @@ def test_a_rotor_gains_by_the_share_of_its_disc_over_the_platform(rotorpy):
 
 def test_lost_rows_are_a_share_in_bursts_of_two(rotorpy):
     *_, flight, _ = rotorpy
-    lost = flight._lost(400_000, 0.08, np.random.default_rng(0))
+    lost = flight._lost_rows(400_000, 0.08, np.random.default_rng(0))
     begins = np.count_nonzero(np.diff(lost.astype(int)) > 0)
     np.testing.assert_allclose([lost.mean(), lost.sum() / begins], [0.08, 2.0], rtol=0.03)
-    assert not flight._lost(1000, 0.0, np.random.default_rng(0)).any()
+    assert not flight._lost_rows(1000, 0.0, np.random.default_rng(0)).any()
 
 
 def test_the_wake_is_that_of_gym_pybullet_drones(rotorpy):

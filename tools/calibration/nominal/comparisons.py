@@ -65,7 +65,7 @@ def tasks_of(groups: Sequence[Group], only: tuple[str, ...] = ()) -> list[Task]:
     for group in groups:
         others = [log for other in groups if other.drone == group.drone and other.name != group.name
                   for log in other.logs]
-        out += [Task(group, None, only=only), *([Task(group, others, only=only)] if len(others) > 1 else [])]
+        out += [Task(group, only=only), *([Task(group, others, only=only)] if len(others) > 1 else [])]
     return out
 
 

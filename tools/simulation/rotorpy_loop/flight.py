@@ -72,8 +72,8 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
     craft = craft_of(label, np.array([np.cos(heading), np.sin(heading), 0.0]))
     rotor_factors = np.full(4, 1.0 - label.of("thrust_coeff"))
     rotor_factors[rng.integers(4)] -= label.of("weak_motor")
-    others = np.random.default_rng([label.seed, 1])  # of effects that came later: the flights before stay as they were
-    wake_x_m, motor_noise = others.uniform(*WAKE_X_M), np.zeros(4)
+    rng_of_others = np.random.default_rng([label.seed, 1])  # OTHERS came later: flights without them stay as they were
+    wake_x_m, motor_noise = rng_of_others.uniform(*WAKE_X_M), np.zeros(4)
     sensors, state = Sensors(label, slow_error, rng), craft.initial_state
     delay, latency = (round(0.001 * label.of(k) / STEP_S) for k in ("act_delay", "latency"))  # steps
     commands, estimates, rows, resting = [np.zeros(4)] * (delay + 1), [], [], True
@@ -91,14 +91,11 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
         if strength := label.of("ground_effect"):
             craft.factor *= 1.0 + strength * _lift(craft, state, rotation, course)
         if rms := label.of("motor_noise"):
-            fade = STEP_S / NOISE_S
-            motor_noise = (1.0 - fade) * motor_noise + np.sqrt(2.0 * fade) * rms * others.standard_normal(4)
+            motor_noise = _first_order(motor_noise, NOISE_S, rms, rng_of_others)
             craft.factor *= np.maximum(1.0 + motor_noise, 0.0)
         craft.push = label.of("downwash") * _wake(state["x"] - (wake_x_m, 0.0, 0.0))
         if gust := label.of("gust"):
-            fade = STEP_S / GUST_S
-            state["wind"] = (1.0 - fade) * state["wind"] + np.sqrt(2.0 * fade) * gust * GUST_SHARE \
-                * rng.standard_normal(3)
+            state["wind"] = _first_order(state["wind"], GUST_S, gust, rng, GUST_SHARE)
         state = craft.step(state, {"cmd_motor_speeds": _speeds(craft, commands[0])}, STEP_S)
         resting = state["x"][2] <= 0.0  # RotorPy's own ground holds a vehicle that climbs slower than 0.5 m/s
         if resting:
@@ -106,18 +103,25 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
                       "q": Rotation.from_euler("Z", yaw).as_quat()}
         if not max(abs(roll), abs(pitch)) < FALLEN_TILT_RAD:
             raise AirTouchError(f"{label.file}: falls at {t:.1f} s ({label.effect} {label.strength:.3g})")
-    return _log(np.array(rows), label, rng, others)
+    return _log(np.array(rows), label, rng, rng_of_others)
 
 
-def _log(table: np.ndarray, label: Label, rng: np.random.Generator, others: np.random.Generator) -> FlightLog:
+def _first_order(values: np.ndarray, time_s: float, rms: float, rng: np.random.Generator,
+                 share: np.ndarray | float = 1.0) -> np.ndarray:
+    """First-order noise (k,) of an rms and a correlation time, a step after `values`; share (k,): factors on rms."""
+    fade = STEP_S / time_s
+    return (1.0 - fade) * values + np.sqrt(2.0 * fade) * rms * share * rng.standard_normal(len(values))
+
+
+def _log(table: np.ndarray, label: Label, rng: np.random.Generator, rng_of_losses: np.random.Generator) -> FlightLog:
     """The log of a table (rows, columns), with the times as they were logged and without the rows that were lost."""
     late = 0.001 * label.of("time_jitter") * rng.standard_normal(len(table))
     times = np.maximum.accumulate(ROWS * STEP_S * np.arange(len(table)) + late - min(late[0], 0.0))
-    kept = ~_lost(len(table), label.of("packet_loss"), others)
-    return FlightLog({"t_s": times[kept], **{name: table[kept, i] for i, name in enumerate(COLUMNS)}})
+    logged = ~_lost_rows(len(table), label.of("packet_loss"), rng_of_losses)
+    return FlightLog({"t_s": times[logged], **{name: table[logged, i] for i, name in enumerate(COLUMNS)}})
 
 
-def _lost(n: int, share: float, rng: np.random.Generator) -> np.ndarray:
+def _lost_rows(n: int, share: float, rng: np.random.Generator) -> np.ndarray:
     """Which of n rows are lost, bool (n,): a share of them, in bursts of BURST rows in the mean."""
     begin, lost = share / (1.0 - share) / BURST, [False]
     for u in rng.random(n - 1):

@@ -96,8 +96,9 @@ def push_gate(data: Data) -> tuple[Gate, float]:
         strongest = push[np.argmax(np.abs(push))]
         if abs(strongest) <= SINGLE_OVER * deviation(push[counts]):
             continue
-        stretches = runs(push / strongest > 0.5)
-        highest = sorted(stretches, key=lambda run: -np.max(push[slice(*run)] / strongest))[:MOST_INTERVALS]
+        relative = push / strongest
+        peaks = {run: relative[slice(*run)].max() for run in runs(relative > 0.5)}
+        highest = sorted(peaks, key=peaks.__getitem__, reverse=True)[:MOST_INTERVALS]
         gate += [(flight.name, a * PERIOD_S, b * PERIOD_S) for a, b in sorted(highest)]
         cost += interval_cost(pieces) * len(highest)
     return tuple(gate), cost
