@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.policy import LEAST_GAIN
 from airtouch.gap.naming.records import Hypothesis, Strength
+from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import terms
 from airtouch.gap.signatures.scatter import Scatter
 from gap_flights import VEHICLE
@@ -80,3 +82,20 @@ def test_the_chance_error_of_a_noise_counts(seconds):
     off_by_chance = noise.strength.mean[0] * np.sqrt(2.0 * samples)
     sure = with_evidence(data, {"imu_noise": replace(noise, gain=1000.0)}, 0.0)["imu_noise"]  # the gain limits nothing
     assert 0.1 * 0.5 * off_by_chance ** 2 < sure.evidence < 0.5 * off_by_chance ** 2
+
+
+def test_a_floor_of_as_many_blocks_halves_what_a_noise_is_evidence_of():
+    """The chance error of a ratio of two powers of as many blocks has twice the variance of that of one power."""
+    nominal = scattered(imu_noise=[1e-6])
+    selection, data = select_from([hover(3, louder=1.06)], ("imu_noise",), nominal)
+    noise = {"imu_noise": replace(selection.single_effects["imu_noise"], gain=1000.0)}
+    blocks = sum(len(first[AIR]) for first in data.block_starts)
+
+    def evidence_with_floor_of(count):
+        floor = replace(data.study.floor, block_counts={**data.study.floor.block_counts, AIR: count})
+        study = replace(data.study, floor=floor, nominal_count=2)
+        return with_evidence(Data(study, data.flights), noise, 0.0)["imu_noise"].evidence
+
+    exact = evidence_with_floor_of(10**9)
+    assert evidence_with_floor_of(blocks) == pytest.approx(0.5 * exact, rel=1e-3)
+    assert evidence_with_floor_of(4 * blocks) == pytest.approx(0.8 * exact, rel=1e-3)

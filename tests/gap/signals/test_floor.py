@@ -67,6 +67,14 @@ def test_the_floor_of_white_noise_is_its_density_in_both_states():
         assert inside.mean() == pytest.approx(density, rel=0.02)
 
 
+def test_the_floor_of_few_blocks_is_as_often_too_high_as_too_low():
+    """40 flights of six blocks each; smoothed in the logarithm, mean powers of six would be 8 % too low."""
+    floors = [floor_of([nominal_of(*white(9.0, seed))], np.zeros(COUNT)) for seed in range(40)]
+    assert {f.block_counts[AIR] for f in floors} == {6}
+    inside = np.array([f.power[AIR][2:-8] for f in floors]) / (2.0 * PERIOD_S * RMS ** 2)
+    assert np.log(inside).mean() == pytest.approx(0.0, abs=0.015)
+
+
 def test_the_bins_of_the_means_are_not_smoothed():
     one, noise = white(60.0, 2)
     nominal = nominal_of(one, noise + 5.0)

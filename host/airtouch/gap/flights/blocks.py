@@ -3,6 +3,7 @@
 import functools
 
 import numpy as np
+from scipy.special import digamma
 
 from airtouch.gap.flights.flight import PERIOD_S
 
@@ -39,3 +40,12 @@ def hann_window(length: int) -> tuple[np.ndarray, float]:
     """A Hann window (length, 1), and what makes of a spectrum under it one of unit/sqrt(Hz)."""
     window = np.hanning(length + 1)[:-1]
     return window[:, None], np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
+
+
+def log_bias(blocks: int) -> float:
+    """What the logarithm of a mean of so many powers is expected to lie off that of the power: digamma(n) - log(n).
+
+    The powers of a bin in different blocks are exponential and nearly independent: half overlapping Hann blocks share
+    1/36 of their power's variance. Below 0: about -1 / (2 n).
+    """
+    return float(digamma(blocks) - np.log(blocks))

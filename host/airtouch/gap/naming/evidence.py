@@ -15,6 +15,7 @@ What an effect gains by another echo of the gyro's noise (`evidence.sensing`) is
 is no part of the minimum, and is added to it.
 
 The nominal scatter is that beyond chance. So the chance error of a strength counts beside it, a random effect's too.
+Of that one the floor has its share: it is a power measured on few flights, whose error looks like noise in all bins.
 """
 
 from collections.abc import Mapping
@@ -28,6 +29,7 @@ from airtouch.gap.evidence.random_strength import strength_variance
 from airtouch.gap.evidence.sensing import sensing_gain
 from airtouch.gap.naming.judging import at_bound
 from airtouch.gap.naming.records import Hypothesis
+from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import strength_term
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term
@@ -61,8 +63,17 @@ def _limit(data: Data, hypothesis: Hypothesis) -> float:
         return np.inf
     covariance = strength.covariance
     if own.shows_in == SPECTRUM and hypothesis.full:
-        covariance = np.diag(random_variance(data, hypothesis, own))
+        covariance = (1.0 + _over_baseline(data)) * np.diag(random_variance(data, hypothesis, own))
     return scatter.evidence(hypothesis.name, strength.mean, covariance, strength.half_difference)
+
+
+def _over_baseline(data: Data) -> float:
+    """Blocks in the air of the flights over those that the floor was measured on; 0 without nominal flights.
+
+    The logarithm of a power ratio has the variance 1/n + 1/m, n and m the blocks of its two powers (Fisher's F).
+    """
+    nominal = data.study.floor.block_counts[AIR] if data.study.nominal_count else 0
+    return sum(len(first[AIR]) for first in data.block_starts) / nominal if nominal else 0.0
 
 
 def _own_term(hypothesis: Hypothesis) -> Term:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.blocks import BANDS_HZ
+from airtouch.gap.flights.blocks import BANDS_HZ, log_bias
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.signals.channels import COUNT, TORQUE
@@ -115,7 +115,7 @@ def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     """Power (bins, COUNT) of the floor from that of nominal blocks (blocks, bins, COUNT) and of the sensors' noise."""
     if len(power) < FEWEST_BLOCKS:
         return UNKNOWN_FLOOR * sensor
-    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0))), LEAST_FLOOR * sensor)
+    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0)), len(power)), LEAST_FLOOR * sensor)
 
 
 def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -144,8 +144,12 @@ def sensor_power(sensor_rms: np.ndarray, state: str) -> np.ndarray:
     return white
 
 
-def _smooth(power: np.ndarray) -> np.ndarray:
-    """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged."""
+def _smooth(power: np.ndarray, blocks: int) -> np.ndarray:
+    """Power (bins, COUNT), a mean over so many blocks, averaged over neighbouring bins in the logarithm.
+
+    The lowest two bins, the means, stay as they are.
+    """
     out = power.copy()
-    out[2:] = np.exp(gaussian_filter1d(np.log(np.maximum(power[2:], LEAST_POWER)), SMOOTH, axis=0, mode="nearest"))
+    logarithm = np.log(np.maximum(power[2:], LEAST_POWER)) - log_bias(blocks)
+    out[2:] = np.exp(gaussian_filter1d(logarithm, SMOOTH, axis=0, mode="nearest"))
     return out
