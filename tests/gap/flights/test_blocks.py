@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window
+from airtouch.gap.flights.blocks import count_within, half_overlapping, hann_window, log_bias
 
 
 def test_blocks_hold_no_marked_sample_and_overlap_by_half():
@@ -24,3 +24,9 @@ def test_a_sine_has_its_power_under_the_window():
     sine = np.sqrt(2.0) * np.sin(2.0 * np.pi * 10 / 256 * np.arange(256))[:, None]  # mean square 1
     density = np.abs(np.fft.rfft(sine * window, axis=0) * scale) ** 2
     assert density.sum() * 100.0 / 256 == pytest.approx(1.0)
+
+
+def test_the_bias_of_a_logarithm_is_that_of_means_of_exponential_powers():
+    powers = np.random.default_rng(0).exponential(1.0, (200_000, 6))
+    means = [np.log(powers[:, :n].mean(axis=1)).mean() for n in (1, 2, 6)]
+    np.testing.assert_allclose(log_bias(np.array([1, 2, 6])), means, atol=0.006)
