@@ -1,7 +1,6 @@
 """Blocks of a flight, half overlapping, the Hann window under which their spectra are taken, and their bands."""
 
 import functools
-from typing import Any
 
 import numpy as np
 from scipy.special import digamma
@@ -43,10 +42,10 @@ def hann_window(length: int) -> tuple[np.ndarray, float]:
     return window[:, None], np.sqrt(2.0 * PERIOD_S / (window ** 2).sum())
 
 
-def log_bias(blocks: int | np.ndarray) -> Any:
+def log_bias(blocks: np.ndarray) -> np.ndarray:
     """What the logarithm of a mean of so many powers is expected to lie off that of the power: digamma(n) - log(n).
 
     The powers of a bin in different blocks are exponential and nearly independent: half overlapping Hann blocks share
-    1/36 of their power's variance. Below 0: about -1 / (2 n).
+    1/36 of their power's variance. Below 0: about -1 / (2 n). blocks (...): n of each mean, 1 at least.
     """
     return digamma(blocks) - np.log(blocks)

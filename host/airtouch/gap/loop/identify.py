@@ -85,7 +85,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
         by_firmware=by_firmware, strengths=tuple(axis.strengths for axis in fitted), floor=power, blocks=len(powers),
         slopes=slopes, edges=edge_floor_of(flights, vehicle, calibration))
     model = loop.nominal_power()
-    over_model = np.log(power / model) - log_bias(len(powers))
+    over_model = np.log(power / model) - log_bias(np.array(len(powers)))
     return replace(loop, floor=model * np.exp(gaussian_filter1d(over_model, FLOOR_SMOOTH, axis=0, mode="nearest")))
 
 

@@ -115,7 +115,8 @@ def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     """Power (bins, COUNT) of the floor from that of nominal blocks (blocks, bins, COUNT) and of the sensors' noise."""
     if len(power) < FEWEST_BLOCKS:
         return UNKNOWN_FLOOR * sensor
-    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0)), len(power)), LEAST_FLOOR * sensor)
+    counted = np.maximum(np.isfinite(power).sum(axis=0), 1)
+    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0)), counted), LEAST_FLOOR * sensor)
 
 
 def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -144,12 +145,12 @@ def sensor_power(sensor_rms: np.ndarray, state: str) -> np.ndarray:
     return white
 
 
-def _smooth(power: np.ndarray, blocks: int) -> np.ndarray:
-    """Power (bins, COUNT), a mean over so many blocks, averaged over neighbouring bins in the logarithm.
+def _smooth(power: np.ndarray, blocks: np.ndarray) -> np.ndarray:
+    """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged.
 
-    The lowest two bins, the means, stay as they are.
+    power (bins, COUNT): means; blocks (bins, COUNT): over how many blocks each.
     """
     out = power.copy()
-    logarithm = np.log(np.maximum(power[2:], LEAST_POWER)) - log_bias(blocks)
-    out[2:] = np.exp(gaussian_filter1d(logarithm, SMOOTH, axis=0, mode="nearest"))
+    logarithm = np.log(np.maximum(power, LEAST_POWER)) - log_bias(blocks)
+    out[2:] = np.exp(gaussian_filter1d(logarithm[2:], SMOOTH, axis=0, mode="nearest"))
     return out
