@@ -50,6 +50,7 @@ def test_models_are_more_exact_in_simulated_flights():
     assert (simulated.misfit_share, own.misfit_share, recorded.misfit_share) == (0.01, 0.01, 0.1)
     assert (simulated.loop_misfit_share, own.loop_misfit_share, recorded.loop_misfit_share) == (0.25, 0.1, 0.25)
     assert simulated.misfit_by_cell and not recorded.misfit_by_cell
+    assert own.loop_misfit_by_cell and not simulated.loop_misfit_by_cell and not recorded.loop_misfit_by_cell
     assert recorded.loop_is_assumed and not simulated.loop_is_assumed
     assert recorded.must_close_gap and not recorded.judges_over_prediction
     assert simulated.judges_over_prediction and not simulated.must_close_gap

@@ -102,25 +102,25 @@ def test_a_second_of_a_name_is_a_further_effect_of_its_own(rotors, share):
     def hypothesis(gain, of_rotors):
         return Hypothesis("weak_motor", tuple(WEAK[r] for r in of_rotors), gain, full=False)
 
-    judged = changing_the_loop(False, misfit_by_cell=False)
+    judged = changing_the_loop(misfit_by_cell=False, loop_misfit_by_cell=False)
     least = thresholds.least_further_gain(judged, hypothesis(10_000.0, (1,)), hypothesis(10_050.0, rotors))
     assert least == pytest.approx(share * 10_000.0)
 
 
-def changing_the_loop(same_models, **policy):
+def changing_the_loop(**policy):
     """A trial in which every effect changes the loop, with a policy."""
-    study = SimpleNamespace(loop=SimpleNamespace(changes_loop=lambda active: True), same_models=same_models)
+    study = SimpleNamespace(loop=SimpleNamespace(changes_loop=lambda active: True))
     return SimpleNamespace(data=SimpleNamespace(study=study),
                            policy=SimpleNamespace(misfit_share=0.01, loop_misfit_share=0.25, **policy))
 
 
-@pytest.mark.parametrize(("same_models", "against"), [(True, 3000.0), (False, 10_000.0)])
-def test_what_a_fitted_loop_is_wrong_by_shows_everywhere(cells, same_models, against):
+@pytest.mark.parametrize(("by_cell", "against"), [(True, 3000.0), (False, 10_000.0)])
+def test_what_a_fitted_loop_is_wrong_by_shows_everywhere(cells, by_cell, against):
     """An effect that changes the loop beside another one: held against the cell that it improves, or all."""
-    held = replace(fitted(10_000.0), terms=(WEAK[1],))
-    more = replace(fitted(10_030.0), terms=(WEAK[1], WEAK[2]))
-    judged = changing_the_loop(same_models, misfit_by_cell=True)
-    assert thresholds.least_further_gain(judged, held, more) == pytest.approx(0.25 * against)
+    base = replace(fitted(10_000.0), terms=(WEAK[1],))
+    extended = replace(fitted(10_030.0), terms=(WEAK[1], WEAK[2]))
+    judged = changing_the_loop(misfit_by_cell=True, loop_misfit_by_cell=by_cell)
+    assert thresholds.least_further_gain(judged, base, extended) == pytest.approx(0.25 * against)
 
 
 def added_gains(selection):

@@ -95,7 +95,7 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
             craft.factor *= np.maximum(1.0 + motor_noise, 0.0)
         craft.push = label.of("downwash") * _wake(state["x"] - (wake_x_m, 0.0, 0.0))
         if gust := label.of("gust"):
-            state["wind"] = _first_order(state["wind"], GUST_S, gust, rng, GUST_SHARE)
+            state["wind"] = _first_order(state["wind"], GUST_S, gust * GUST_SHARE, rng)
         state = craft.step(state, {"cmd_motor_speeds": _speeds(craft, commands[0])}, STEP_S)
         resting = state["x"][2] <= 0.0  # RotorPy's own ground holds a vehicle that climbs slower than 0.5 m/s
         if resting:
@@ -106,11 +106,10 @@ def fly(label: Label, slow_error: float = 1.0) -> FlightLog:
     return _log(np.array(rows), label, rng, rng_of_others)
 
 
-def _first_order(values: np.ndarray, time_s: float, rms: float, rng: np.random.Generator,
-                 share: np.ndarray | float = 1.0) -> np.ndarray:
-    """First-order noise (k,) of an rms and a correlation time, a step after `values`; share (k,): factors on rms."""
+def _first_order(values: np.ndarray, time_s: float, rms: np.ndarray | float, rng: np.random.Generator) -> np.ndarray:
+    """First-order noise (k,) of an rms, one for all or (k,), and a correlation time, a step after `values`."""
     fade = STEP_S / time_s
-    return (1.0 - fade) * values + np.sqrt(2.0 * fade) * rms * share * rng.standard_normal(len(values))
+    return (1.0 - fade) * values + np.sqrt(2.0 * fade) * rms * rng.standard_normal(len(values))
 
 
 def _log(table: np.ndarray, label: Label, rng: np.random.Generator, rng_of_losses: np.random.Generator) -> FlightLog:

@@ -1,8 +1,9 @@
-"""Blocks of a flight, half overlapping, the Hann window under which their spectra are taken, and their bands."""
+"""Blocks of a flight, half overlapping, the window and the bands of their spectra, and how mean powers are smoothed."""
 
 import functools
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 from scipy.special import digamma
 
 from airtouch.gap.flights.flight import PERIOD_S
@@ -43,9 +44,18 @@ def hann_window(length: int) -> tuple[np.ndarray, float]:
 
 
 def log_bias(blocks: np.ndarray) -> np.ndarray:
-    """What the logarithm of a mean of so many powers is expected to lie off that of the power: digamma(n) - log(n).
+    """Expected error of the logarithm of a mean of n powers: digamma(n) - log(n), which is below 0, about -1 / (2 n).
 
     The powers of a bin in different blocks are exponential and nearly independent: half overlapping Hann blocks share
-    1/36 of their power's variance. Below 0: about -1 / (2 n). blocks (...): n of each mean, 1 at least.
+    1/36 of their power's variance. blocks (...): n of each mean, 1 at least.
     """
     return digamma(blocks) - np.log(blocks)
+
+
+def smooth_power(power: np.ndarray, blocks: np.ndarray, width: float) -> np.ndarray:
+    """Mean powers (bins, k), each above 0, averaged over neighbouring bins in the logarithm, without its bias.
+
+    blocks (bins, k), or a shape that spreads to it: over how many blocks each is a mean, 1 at least; width: standard
+    deviation of the Gaussian, bins.
+    """
+    return np.exp(gaussian_filter1d(np.log(power) - log_bias(blocks), width, axis=0, mode="nearest"))

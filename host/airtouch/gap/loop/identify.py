@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import float64, int64, njit, types
-from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize
 
 from airtouch.gap.edges.edge_response import edge_floor_of
-from airtouch.gap.flights.blocks import log_bias
+from airtouch.gap.flights.blocks import smooth_power
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.flights.hardness import hardness_of, slopes_of
 from airtouch.gap.loop.axis_plant import AxisPlant, PlantRow, axis_plant
@@ -85,8 +84,7 @@ def identify(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequence[
         by_firmware=by_firmware, strengths=tuple(axis.strengths for axis in fitted), floor=power, blocks=len(powers),
         slopes=slopes, edges=edge_floor_of(flights, vehicle, calibration))
     model = loop.nominal_power()
-    over_model = np.log(power / model) - log_bias(np.array(len(powers)))
-    return replace(loop, floor=model * np.exp(gaussian_filter1d(over_model, FLOOR_SMOOTH, axis=0, mode="nearest")))
+    return replace(loop, floor=model * smooth_power(power / model, np.array(len(powers)), FLOOR_SMOOTH))
 
 
 def noise_strengths(controller: Controller, plant: AxisPlant, power: np.ndarray, updates: int = UPDATES,

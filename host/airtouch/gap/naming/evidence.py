@@ -15,7 +15,7 @@ What an effect gains by another echo of the gyro's noise (`evidence.sensing`) is
 is no part of the minimum, and is added to it.
 
 The nominal scatter is that beyond chance. So the chance error of a strength counts beside it, a random effect's too.
-Of that one the floor has its share: it is a power measured on few flights, whose error looks like noise in all bins.
+The error of the floor adds to it: the floor is measured on few flights, and its error looks like noise in all bins.
 """
 
 from collections.abc import Mapping
@@ -72,8 +72,10 @@ def _over_baseline(data: Data) -> float:
 
     The logarithm of a power ratio has the variance 1/n + 1/m, n and m the blocks of its two powers (Fisher's F).
     """
-    nominal = data.study.floor.block_counts[AIR] if data.study.nominal_count else 0
-    return sum(len(first[AIR]) for first in data.block_starts) / nominal if nominal else 0.0
+    nominal = data.study.floor.block_counts[AIR]
+    if not (data.study.nominal_count and nominal):
+        return 0.0
+    return sum(len(first[AIR]) for first in data.block_starts) / nominal
 
 
 def _own_term(hypothesis: Hypothesis) -> Term:

@@ -147,9 +147,10 @@ class NamingPolicy:
 
     least_evidence: nats that the first effect must gain, and that every effect must have as evidence to be named.
 
-    misfit_share: fraction of their gain that the models of effects may be wrong by; loop_misfit_share: the same for an
-    effect that changes the loop, beside one whose spectrum is assumed; misfit_by_cell: whether a model is wrong only
-    where it acts, so that the gain in improved cells alone counts.
+    misfit_share: fraction of their gain that the models of effects may be wrong by; misfit_by_cell: whether a model is
+    wrong only where it acts, so that the gain in improved cells alone counts; loop_misfit_share, loop_misfit_by_cell:
+    the same for an effect that changes the loop, beside one whose spectrum is assumed. A loop that is fitted to
+    nominal flights is wrong in all axes.
 
     loop_is_assumed: whether the spectrum of an effect that changes the loop is assumed, not measured;
     judges_over_prediction: whether effects are held against what the flights do not show; judges_unsteadiness: whether
@@ -159,8 +160,9 @@ class NamingPolicy:
 
     least_evidence: float
     misfit_share: float
-    loop_misfit_share: float
     misfit_by_cell: bool
+    loop_misfit_share: float
+    loop_misfit_by_cell: bool
     loop_is_assumed: bool
     judges_over_prediction: bool
     judges_unsteadiness: bool
@@ -176,8 +178,9 @@ def policy_of(study: Study, seconds: float) -> NamingPolicy:
     return NamingPolicy(
         least_evidence=FIRST_GAIN if study.simulated and study.loop is not None else LEAST_GAIN,
         misfit_share=MISFIT_SHARE_SIMULATED if study.simulated else MISFIT_SHARE_RECORDED,
-        loop_misfit_share=MISFIT_SHARE_LOOP_OWN_FIRMWARE if study.same_models else MISFIT_SHARE_LOOP_OTHER_FIRMWARE,
         misfit_by_cell=study.simulated,
+        loop_misfit_share=MISFIT_SHARE_LOOP_OWN_FIRMWARE if study.same_models else MISFIT_SHARE_LOOP_OTHER_FIRMWARE,
+        loop_misfit_by_cell=study.same_models,
         loop_is_assumed=not study.simulated,
         judges_over_prediction=study.simulated,
         judges_unsteadiness=not study.simulated,

@@ -21,16 +21,15 @@ from airtouch.gap.signatures.term import Term
 def least_further_gain(trial: Trial, base: Hypothesis, extended: Hypothesis) -> float:
     """Held-out nats that a further effect must gain to be added.
 
-    base: the hypothesis of the effects before it; extended: the same with the further one. An effect that changes the
-    loop, beside one that is random or changes it too, is held against the gain everywhere if the loop is a fitted one:
-    what its model is wrong by shows in all axes.
+    base: the hypothesis of the effects before it; extended: the same with the further one.
     """
     before = {t.slot for t in base.terms}
     new = [t for t in extended.terms if t.slot not in before]
     looks_alike = assumes(trial.data, base.terms) and changes_loop(trial.data, new)
-    share = trial.policy.loop_misfit_share if looks_alike else trial.policy.misfit_share
-    everywhere = is_random(extended.name) or looks_alike and not trial.data.study.same_models
-    return misfit(trial, base, extended, share, everywhere)
+    policy = trial.policy
+    share = policy.loop_misfit_share if looks_alike else policy.misfit_share
+    by_cell = policy.loop_misfit_by_cell if looks_alike else policy.misfit_by_cell
+    return misfit(trial, base, extended, share, everywhere=is_random(extended.name) or not by_cell)
 
 
 def is_random_misfit(trial: Trial, base: Hypothesis, extended: Hypothesis) -> bool:

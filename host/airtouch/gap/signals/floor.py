@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.blocks import BANDS_HZ, log_bias
+from airtouch.gap.flights.blocks import BANDS_HZ, smooth_power
 from airtouch.gap.flights.flight import GROUND, PERIOD_S, Flight
 from airtouch.gap.flights.hardness import Slopes, hardness_of, slopes_of
 from airtouch.gap.signals.channels import COUNT, TORQUE
@@ -115,8 +114,9 @@ def _floor_power(power: np.ndarray, sensor: np.ndarray) -> np.ndarray:
     """Power (bins, COUNT) of the floor from that of nominal blocks (blocks, bins, COUNT) and of the sensors' noise."""
     if len(power) < FEWEST_BLOCKS:
         return UNKNOWN_FLOOR * sensor
-    counted = np.maximum(np.isfinite(power).sum(axis=0), 1)
-    return np.maximum(_smooth(np.nan_to_num(np.nanmean(power, axis=0)), counted), LEAST_FLOOR * sensor)
+    mean, blocks = np.nan_to_num(np.nanmean(power, axis=0)), np.maximum(np.isfinite(power).sum(axis=0), 1)
+    mean[2:] = smooth_power(np.maximum(mean[2:], LEAST_POWER), blocks[2:], SMOOTH)  # the lowest two hold the means
+    return np.maximum(mean, LEAST_FLOOR * sensor)
 
 
 def _offsets(nominal: Sequence[NominalBlocks], lowest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -143,14 +143,3 @@ def sensor_power(sensor_rms: np.ndarray, state: str) -> np.ndarray:
     differences = difference_power(np.maximum(f, LEAKED * f[1]))
     white[:, TORQUE] = differences[:, None] * 2.0 * PERIOD_S * (sensor_rms[TORQUE] / PERIOD_S) ** 2
     return white
-
-
-def _smooth(power: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-    """Power averaged over neighbouring bins in the logarithm, the lowest two (the means) unchanged.
-
-    power (bins, COUNT): means; blocks (bins, COUNT): over how many blocks each.
-    """
-    out = power.copy()
-    logarithm = np.log(np.maximum(power, LEAST_POWER)) - log_bias(blocks)
-    out[2:] = np.exp(gaussian_filter1d(logarithm[2:], SMOOTH, axis=0, mode="nearest"))
-    return out

@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from airtouch.gap.flights.blocks import log_bias
+from airtouch.gap.flights.blocks import smooth_power
 from airtouch.gap.loop.command_spectra import VANISHING_POWER
 from airtouch.gap.loop.disturbed import Disturbed
 from airtouch.gap.loop.torque_share import QUIET, STEPPED, Change, response_ratio
@@ -248,8 +248,8 @@ def _law(kind: int, y: np.ndarray, w: np.ndarray, chosen: np.ndarray, loop: Dist
     of_gyro = _smooth(gyro_power / measured_power)
     noise = np.maximum(of_gyro, np.maximum(NOISE, 1.0 / count))  # of n blocks of noise the coherence is 1/n by chance
     coherent = transfer * np.clip((coherence - noise) / noise, 0.0, 1.0)
-    left = np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER)
-    own_floor = np.exp(_smooth(np.log(left)) - log_bias(count))
+    residual_power = np.maximum(mean(np.abs(y - coherent * w) ** 2), VANISHING_POWER)
+    own_floor = smooth_power(residual_power, count, SMOOTH)
     enough = chosen.sum(axis=0) >= FEWEST_OF_KIND
     weight = np.ones(own_floor.shape) if floor is None else np.where(enough, np.sqrt(floor / own_floor), np.nan)
     answer = coherent * loop.commanded  # what the loop commands against a torque from outside, as far as it is seen
