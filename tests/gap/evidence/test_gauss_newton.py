@@ -11,7 +11,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.fit import PRIOR_STD
 from airtouch.gap.evidence.gauss_newton import (
     COMMAND_PRIOR_STD,
-    LEAST_STEP_GAIN,
+    LEAST_PROMISE,
     LOOP_STARTS,
     MOST_ATTEMPTS,
     NEAR_NEUTRAL,
@@ -188,18 +188,17 @@ def test_a_prior_draws_the_minimum_to_neutral_as_in_ridge_regression():
     assert result.x == pytest.approx([3.0 / (1.0 + 1.0 / 0.5 ** 2)], rel=1e-6)
 
 
-def test_the_fit_ends_with_the_first_step_that_gains_too_little():
-    """Of f(x) = x^2 each step halves x: a cost of x^4 / 2 falls to a sixteenth.
+def test_a_step_that_promises_too_little_is_not_tried():
+    """Of f(x) = x^2 each step halves x; its equations are those of a line, and promise all of the cost, x^4 / 2.
 
-    From 4 on the steps gain 120, 7.5, 0.47, 0.029 and 0.0018 nats, of which only the last is less than LEAST_STEP_GAIN.
+    From 3.5 on they promise 75, 4.7, 0.29, 0.018, 0.0011 nats, of which only the last is less than LEAST_PROMISE.
     """
-    halvings = [4.0 * 0.5 ** i for i in range(8)]
-    gains = [0.5 * (a ** 4 - b ** 4) for a, b in zip(halvings, halvings[1:], strict=False)]
-    last = next(i for i, gain in enumerate(gains) if gain < LEAST_STEP_GAIN) + 1
-    assert last == 5
+    halvings = [3.5 * 0.5 ** i for i in range(8)]
+    steps = next(i for i, x in enumerate(halvings) if 0.5 * x ** 4 < LEAST_PROMISE)
+    assert steps == 4
     posterior = counted_posterior_of(LeastSquares(lambda x: x ** 2, 1), effect(1))
-    result = gauss_newton(posterior, np.full(1, 4.0), most=100)
-    assert result.x == pytest.approx([halvings[last]], rel=0.1) and posterior.points == 1 + last
+    result = gauss_newton(posterior, np.full(1, 3.5), most=100)
+    assert result.x == pytest.approx([halvings[steps]], rel=0.1) and posterior.points == 1 + steps
 
 
 def test_slopes_that_point_the_wrong_way_are_taken_anew():

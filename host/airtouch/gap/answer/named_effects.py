@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
@@ -14,6 +15,7 @@ from airtouch.gap.evidence.problem import BlockSet, whole_of
 from airtouch.gap.naming.records import Hypothesis, Selection
 from airtouch.gap.relations.readout import Reading
 from airtouch.gap.result import NamedEffect
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.signature import CLOCK, SPECTRUM
 from airtouch.gap.signatures.term import Term
 
@@ -59,10 +61,18 @@ def median_shape_fit(data: Data, all_blocks: BlockSet, terms: Sequence[Term], st
     for i, term in enumerate(terms):
         shapes = term.shaped()
         if shapes:
-            fits = [fit(data, all_blocks, [*chosen[:i], shape, *chosen[i + 1:]], start) for shape in shapes]
-            median = median_index([judge(data, all_blocks, f.terms) for f in fits])
-            chosen[i], fitted = shapes[median], fits[median]
+            fits = map_on_two_cores(partial(_fitted_and_judged, data, all_blocks, start),
+                                    [[*chosen[:i], shape, *chosen[i + 1:]] for shape in shapes])
+            median = median_index([log_likelihood for _, log_likelihood in fits])
+            chosen[i], fitted = shapes[median], fits[median][0]
     return converged(data, all_blocks, fitted or fit(data, all_blocks, terms, start))
+
+
+def _fitted_and_judged(data: Data, blocks: BlockSet, start: np.ndarray | None, terms: Sequence[Term],
+                       ) -> tuple[FittedTerms, float]:
+    """Effects fitted to some blocks, and the log likelihood of these, nats."""
+    fitted = fit(data, blocks, terms, start)
+    return fitted, judge(data, blocks, fitted.terms)
 
 
 def median_index(log_likelihoods: Sequence[float]) -> int:

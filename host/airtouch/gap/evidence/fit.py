@@ -63,9 +63,8 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     effects.
 
     Mean and random effects are fitted in turn, MOST_TURNS times at most, until a turn gains less than LEAST_TURN_GAIN.
-    The turn of the highest posterior is returned: a later one may be worse, as the fit of mean effects begins with the
-    offsets at 0. The fit may end before it stands still. Where that matters, `converged` begins it anew and returns the
-    likelier.
+    A turn begins where the one before ended, and that of the highest posterior is returned. The fit may end before it
+    stands still. Where that matters, `converged` begins it anew and returns the likelier.
     """
     problem = problem_of(data, blocks)
     mean, random = mean_of(terms), random_of(terms)
@@ -75,11 +74,11 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     if random and mean and start is not None:
         random = fit_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
         random_power = problem.random_power(random)
-    best, highest = None, -np.inf
+    best, highest, offsets = None, -np.inf, None
     for _ in range(1 if brief else MOST_TURNS):
         posterior = Posterior(problem, mean, random_power, prior_std, uncertain_floor=bool(random))
-        solution = gauss_newton(posterior, x, BRIEF_STEPS if brief else MOST_STEPS)
-        x, active = solution.x, active_at(mean, solution.x)
+        solution = gauss_newton(posterior, x, BRIEF_STEPS if brief else MOST_STEPS, offsets)
+        x, offsets, active = solution.x, solution.offsets, active_at(mean, solution.x)
         if not random:
             return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
         random = fit_strengths(problem, random, solution.residual, active)

@@ -51,6 +51,10 @@ class NormalEquations(NamedTuple):
         right[:k] += slopes.gradient
         return NormalEquations(matrix, right)
 
+    def gain_of(self, change: np.ndarray) -> float:
+        """Nats that a step (k + m,) gains as far as the equations know: to second order."""
+        return float(change @ (self.right - 0.5 * (self.matrix @ change)))
+
 
 def normal_equations(columns: Sequence[np.ndarray] | np.ndarray, prior_stds: np.ndarray, residual: np.ndarray,
                      weights: np.ndarray, at: np.ndarray, offsets: Sequence[Offset] = ()) -> NormalEquations:

@@ -60,13 +60,21 @@ class LoopParts(NamedTuple):
 
 
 def excess_phase(c: Controller, plant: AxisPlant) -> float:
-    """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable."""
+    """Phase (rad) by which the loop lags more than half a turn where its gain last is 1; > 0: unstable.
+
+    Between two of CROSSING_HZ phase and logarithm of the gain are straight lines, so that it is continuous in the
+    parameters of the loop: fits fail at steps.
+    """
     parts = loop_parts(c, plant, CROSSING_HZ)
     loop = parts.plant * parts.controller
-    phase, size = np.unwrap(np.angle(loop)), np.abs(loop)
+    phase, log_size = np.unwrap(np.angle(loop)), np.log(np.abs(loop))
     phase += -2.0 * np.pi * np.ceil(phase[0] / (2.0 * np.pi))
-    last = np.flatnonzero(size > 1.0)
-    return float(-np.pi - phase[last[-1]]) if len(last) else -np.pi
+    above = np.flatnonzero(log_size > 0.0)
+    if not len(above):
+        return -np.pi
+    last, following = above[-1], min(above[-1] + 1, len(phase) - 1)
+    share = log_size[last] / (log_size[last] - log_size[following]) if following > last else 0.0
+    return float(-np.pi - phase[last] - share * (phase[following] - phase[last]))
 
 
 def torque_per_command(c: Controller, plant: AxisPlant, f: np.ndarray) -> np.ndarray:

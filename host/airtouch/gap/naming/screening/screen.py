@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from airtouch.gap.evidence.fit import PRIOR_STD
 from airtouch.gap.evidence.judge import JudgedBlocks, judged_blocks
+from airtouch.gap.evidence.problem import problem_of
 from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_all, price_of
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.records import Charges, Hypothesis, Strength
@@ -48,6 +50,11 @@ class RoundStart:
     def terms(self) -> Terms:
         """The terms of the base."""
         return self.base.terms if self.base else ()
+
+    @property
+    def sees_edges(self) -> bool:
+        """Whether a response at an edge is judged."""
+        return any(problem_of(self.trial.data, half).flat.commands.edges for half in self.trial.halves)
 
 
 @dataclass
@@ -109,11 +116,25 @@ def addable(name: str, variants: Sequence[Terms], base: Terms) -> list[PricedVar
 
 def _screened_means(start: RoundStart, variant: PricedVariant) -> Hypothesis | None:
     """A variant of mean effects judged to first order; None where only the commands show them, which a fit judges."""
+    if all(t.signature.edges_only for t in variant.terms) and not start.sees_edges:
+        return _without_a_trace(start, variant)
     if any(t.shows_in != MEAN or t.signature.commands_only for t in variant.terms):
         return None
     judged = _judged_to_first_order(start, variant)
     hopeless = judged.gain < start.gain + HOPELESS
     return None if hopeless and _only_in_commands(start.trial, variant.terms) else judged
+
+
+def _without_a_trace(start: RoundStart, variant: PricedVariant) -> Hypothesis:
+    """The hypothesis that adds effects of which the flights show nothing: it loses what it costs.
+
+    Its strength has the variance of a mean of two halves.
+    """
+    k = len(strength_term(variant.terms).signature.free)
+    return Hypothesis(variant.name, (*start.terms, *variant.terms),
+                      start.gain - price_of(variant.terms) - variant.choice_cost, full=False,
+                      charges=start.charges.with_effect(variant.choice_cost),
+                      strength=Strength(np.zeros(k), 0.5 * PRIOR_STD ** 2 * np.eye(k), np.zeros(k)))
 
 
 def _judged_to_first_order(start: RoundStart, variant: PricedVariant) -> Hypothesis:
