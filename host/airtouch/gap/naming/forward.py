@@ -162,12 +162,12 @@ def _extensions(search: Search, steps: Sequence[Step], before: Mapping[str, Hypo
     """Every candidate beside the steps so far, with the nats that each must gain.
 
     before: hypotheses of candidates as judged before the newest step; further_gains: nats that each of them gained over
-    the steps then. Beside a deviation of nominal flights only those are judged again that gained something without it,
-    as a deviation takes gain from others and seldom adds any.
+    the steps then. Beside a deviation of nominal flights, if it is the newest step, only those are judged again that
+    gained something without it, as a deviation takes gain from others and seldom adds any.
     """
     trial, any_named = search.trial, any(s.is_named for s in steps)
     gaining_names = {n for n, gain in further_gains.items() if gain > WORTH_AGAIN * FIRST_GAIN}
-    candidates = {n: v for n, v in search.candidates.items() if any_named or n in gaining_names}
+    candidates = {n: v for n, v in search.candidates.items() if steps[-1].is_named or n in gaining_names}
     sure_names = {n for n, h in before.items() if h.full and h.evidence >= SURE_EVIDENCE and not is_random(n)}
     best = round_of(trial, candidates, steps[-1], search.progress, promising=sure_names)
     return {n: Extension(c, least_further_gain(trial, steps[-1], c) if any_named else trial.policy.least_evidence)

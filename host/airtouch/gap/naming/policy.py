@@ -44,8 +44,8 @@ HOPELESS = 0.5
 #: nats that a variant's mean term may be behind the best in screening and still be fitted with its random part; chosen:
 #: odds of 20, as between candidates (`answer.ranking.LEAST_DIFFERENCE`)
 ABOUT_AS_GOOD = 3.0
-#: nats that a hypothesis must gain in screening, or by a brief fit, to be fitted in full; chosen for time: less means
-#: more fits, more loses effects that screening takes for weaker than they are
+#: nats that a hypothesis must gain in screening to be fitted in full; chosen for time: less means more fits, more loses
+#: effects that screening takes for weaker than they are
 PROMISING = 0.5 * FIRST_GAIN
 #: hypotheses judged to first order, the best of them, among which those that gain PROMISING are fitted in full; others
 #: are fitted beside these: random effects that promise something, what only a fit can judge, and names that a round is

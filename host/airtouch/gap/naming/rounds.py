@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
-from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, LONGER_GAIN, PROMISING
+from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, FIRST_GAIN, LONGER_GAIN, PROMISING
 from airtouch.gap.naming.records import Hypothesis, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
@@ -67,13 +67,14 @@ def _fit_variant(trial: Trial, variant: PricedVariant, base: Hypothesis | None) 
     """A variant fitted beside a base.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
-    where that promises something.
+    where that gains half of what it must.
     """
     fit = partial(cross_validated, trial, variant, base)
     if not all(t.signature.loop_only for t in variant.terms):
         return fit()
-    briefly, before = fit(brief=True), base.gain if base else 0.0
-    return fit() if briefly.gain - before > PROMISING else briefly
+    briefly = fit(brief=True)
+    before, required = (base.gain, least_further_gain(trial, base, briefly)) if base else (0.0, FIRST_GAIN)
+    return fit() if briefly.gain - before > 0.5 * required else briefly
 
 
 def _best_variants(means: Sequence[Hypothesis]) -> list[Hypothesis]:
