@@ -169,7 +169,8 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
                   ) -> tuple[list[Hypothesis], list[PricedVariant]]:
     """Variants with a random term: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it.
+    A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it; the best
+    alone if `every_random`, as the strength of the best of several fits would be biased upwards.
 
     1. A candidate promises something where its random term or its best mean term gains more than HOPELESS nats; every
        one counts as such if `every_random`.
@@ -188,7 +189,8 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
         best = max(_screened_random(start, own), key=lambda s: s.gain)
         mean_promises = bool(good_means) and good_means[0].gain - start.gain > HOPELESS
         if every_random or best.gain > HOPELESS or mean_promises:
-            to_fit += _variants_to_fit(best.variant, own, [m.terms[-1] for m in good_means])
+            fitted_means = good_means[:1] if every_random else good_means
+            to_fit += _variants_to_fit(best.variant, own, [m.terms[-1] for m in fitted_means])
         elif not good_means:
             unpromising.append(_hypothesis_of(start, best))
     return unpromising, to_fit
