@@ -44,12 +44,15 @@ def test_nominal_flight_has_no_effect():
     assert selection.single_effects["wind"].charges.choice_cost == pytest.approx(np.log(2.0))
 
 
-def test_push_is_named_mass_once(heavy):
+def test_push_is_named_once(heavy):
+    """A mass and a loss of thrust are one push of a vehicle that hovers: chance decides which of them is named."""
     selection, data = heavy
     (step,) = selection.steps
-    assert step.name == "mass" and step.is_named and step.full and step.evidence == step.gain
-    loss = selection.single_effects["thrust_coefficient"].terms[0].values["loss"]
-    assert step.terms[0].values["fraction"] == pytest.approx(loss / (1.0 - loss), rel=0.03)
+    mass, thrust = (selection.single_effects[name] for name in ("mass", "thrust_coefficient"))
+    assert step.name in (mass.name, thrust.name) and mass.gain == pytest.approx(thrust.gain, abs=0.5)
+    assert step.is_named and step.full and step.evidence == step.gain
+    loss = thrust.terms[0].values["loss"]
+    assert mass.terms[0].values["fraction"] == pytest.approx(loss / (1.0 - loss), rel=0.03)
     bias = selection.single_effects["imu_bias"]
     assert bias.terms[0].values["acc_z"] == pytest.approx(-DOWN, rel=0.03)
     assert bias.strength.mean[2] == pytest.approx(-DOWN / 0.1, rel=0.03) and bias.strength.variance.shape == (6,)

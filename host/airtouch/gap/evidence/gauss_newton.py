@@ -18,7 +18,8 @@ from airtouch.gap.signatures.term import Term, mean_slices
 MOST_STEPS = 8  #: steps at most; chosen for time. A smaller number ends more fits before they stand still
 #: nats that a step must gain for the fit to go on; chosen for time. A larger number ends fits too early
 LEAST_STEP_GAIN = 0.02
-#: nats that a step must promise to be tried, to second order; chosen for time. With ten times as many fits end too early
+#: nats that a step must promise to be tried, to second order; chosen for time. With ten times as many fits end too
+#: early
 LEAST_PROMISE = 0.1 * LEAST_STEP_GAIN
 #: attempts at a step, each with more damping than the last; chosen for time. With a smaller number more steps fail
 MOST_ATTEMPTS = 5

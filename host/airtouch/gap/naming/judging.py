@@ -27,9 +27,9 @@ from airtouch.gap.evidence.sensing import gain_outside
 from airtouch.gap.naming.policy import PRICE, NamingPolicy, policy_of
 from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.signals.spectra import AIR, REST
-from airtouch.gap.signatures.candidates import random_of, strength_term
+from airtouch.gap.signatures.candidates import mean_of, random_of, strength_term
 from airtouch.gap.signatures.signature import CLOCK, MEAN
-from airtouch.gap.signatures.term import Term, Terms
+from airtouch.gap.signatures.term import Term, Terms, mean_slices
 
 GROUP = 3  #: neighbouring blocks that stay in one half, in the air 5 s together; chosen
 HALVED_BY_FLIGHT = 4  #: flights from which on the halves are made of whole flights; chosen
@@ -94,10 +94,12 @@ def at_bound(term: Term, strength: np.ndarray) -> np.ndarray:
     return (strength != 0.0) & ((strength <= NEAR_BOUND * low) | (strength >= NEAR_BOUND * high))
 
 
-def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | None, brief: bool = False) -> Hypothesis:
+def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | None, brief: bool = False,
+                    near: Hypothesis | None = None) -> Hypothesis:
     """The hypothesis that adds a variant to those effects of a base, fitted on each half and judged on the other.
 
-    base: None for no effect; brief: the fits are cut short, to see whether whole ones promise anything.
+    base: None for no effect; brief: the fits are cut short, to see whether whole ones promise anything; near: an
+    earlier hypothesis with the variant, at whose values of it the fits begin.
     """
     terms, before = variant.terms, base.terms if base else ()
     charges = _charges(trial, variant, base)
@@ -105,7 +107,7 @@ def cross_validated(trial: Trial, variant: PricedVariant, base: Hypothesis | Non
         gain, fits = base.gain - variant.choice_cost + clock_gains(trial.data, terms), base.fits
     else:
         spectral = [t for t in (*before, *terms) if t.shows_in != CLOCK]
-        fits = tuple(_fit_on(trial, half, spectral, base, brief) for half in (0, 1))
+        fits = tuple(_fit_on(trial, half, spectral, _start(base, spectral, half, near), brief) for half in (0, 1))
         gain = _charged_gain(trial, fits, charges, gain_outside(trial.data, (*before, *terms)))
     of_clock = [measured_clock_term(trial.data, t).term for t in (*before, *terms) if t.shows_in == CLOCK]
     # the halves free the same parameters and differ in their values; a hypothesis has those of the first
@@ -135,13 +137,13 @@ def _charged_gain(trial: Trial, fits: Sequence[FittedTerms], charges: Charges, o
     return held_out + (charges.uncertain_floor_loss - price_of(fits[0].terms) - charges.choice_cost)
 
 
-def _fit_on(trial: Trial, half: int, terms: Sequence[Term], base: Hypothesis | None, brief: bool) -> FittedTerms:
-    """Effects fitted on a half, from where those of a base ended there.
+def _fit_on(trial: Trial, half: int, terms: Sequence[Term], start: np.ndarray | None, brief: bool) -> FittedTerms:
+    """Effects fitted on a half, from scaled parameters `start` on.
 
     The fit is cached: an effect of the clock beside the base changes nothing of it, nor does a second search among
     fewer effects.
     """
-    start, blocks = _start(base, terms, half), trial.halves[half]
+    blocks = trial.halves[half]
     key = half, brief, tuple(t.key for t in terms), None if start is None else start.tobytes()
     return trial.data.workspace.cached(
         "fit", key, lambda: _refine(trial.data, blocks, fit(trial.data, blocks, terms, start, brief=brief)))
@@ -214,10 +216,18 @@ def _refine(data: Data, blocks: BlockSet, fitted: FittedTerms) -> FittedTerms:
     return fit(data, blocks, terms, mean_parameters(terms))
 
 
-def _start(base: Hypothesis | None, terms: Sequence[Term], half: int) -> np.ndarray | None:
-    """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit."""
-    if base is None or not base.fits:
+def _start(base: Hypothesis | None, terms: Sequence[Term], half: int, near: Hypothesis | None) -> np.ndarray | None:
+    """Scaled parameters (k,) of mean effects as fitted to a half before, NaN for the new ones; None without a fit.
+
+    near: where it has the new ones, free in the same parameters, these begin as fitted there.
+    """
+    of_base, of_near = (h.fits[half] if h is not None and h.fits else None for h in (base, near))
+    if of_base is None and of_near is None:
         return None
-    known = base.fits[half].scaled
-    size = sum(len(t.free) for t in terms if t.shows_in == MEAN)
-    return np.concatenate([known, np.full(size - len(known), np.nan)])
+    known = of_base.scaled if of_base is not None else np.zeros(0)
+    out = np.concatenate([known, np.full(sum(len(t.free) for t in mean_of(terms)) - len(known), np.nan)])
+    for term, own in mean_slices(terms):
+        same = [t for t in (of_near.terms if of_near else ()) if (t.slot, t.free) == (term.slot, term.free)]
+        if own.start >= len(known) and of_near is not None and same:
+            out[own] = of_near.scaled[of_near.slice_of(same[0])]
+    return out

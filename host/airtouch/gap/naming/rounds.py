@@ -11,7 +11,7 @@ import numpy as np
 
 from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.judging import PricedVariant, Trial, cross_validated
-from airtouch.gap.naming.policy import BEST_SCREENED, COMPANION_GAIN, FIRST_GAIN, LONGER_GAIN, PROMISING
+from airtouch.gap.naming.policy import BEST_SCREENED, BRIEF_SHARE, COMPANION_GAIN, FIRST_GAIN, LONGER_GAIN, PROMISING
 from airtouch.gap.naming.records import Hypothesis, Strength
 from airtouch.gap.naming.screening.screen import RoundStart, screen_random, screen_variants, start_of
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
@@ -29,6 +29,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypo
     """
     start = start_of(trial, base)
     variants, not_fitted = _screen(start, candidates, progress, promising)
+    variants = _without_hopeless_parts(trial, variants, base)
     fitted = map_on_two_cores(lambda v: _fit_variant(trial, v, base), variants)
     best = best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
     return with_evidence(trial.data, best, start.gain)
@@ -63,18 +64,40 @@ def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     return [*screened.fit_only, *random, *means_to_fit], not_fitted
 
 
+def _without_hopeless_parts(trial: Trial, variants: Sequence[PricedVariant], base: Hypothesis | None,
+                            ) -> list[PricedVariant]:
+    """The variants without those that free one parameter of an effect of the loop whose parameters gain nothing at all.
+
+    What all of them together do not gain by a brief fit, none gains alone.
+    """
+    hopeless = {v.name for v in variants if _is_tried_alone(v) and _of_loop_alone(v)
+                and cross_validated(trial, v, base, brief=True).gain - _gain_of(base) <= PROMISING}
+    return [v for v in variants if v.name not in hopeless or _is_tried_alone(v)]
+
+
 def _fit_variant(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> Hypothesis:
     """A variant fitted beside a base.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
-    where that gains half of what it must.
+    where it may then gain what it must: BRIEF_SHARE of that, less PROMISING.
     """
     fit = partial(cross_validated, trial, variant, base)
-    if not all(t.signature.loop_only for t in variant.terms):
+    if not _of_loop_alone(variant):
         return fit()
     briefly = fit(brief=True)
-    before, required = (base.gain, least_further_gain(trial, base, briefly)) if base else (0.0, FIRST_GAIN)
-    return fit() if briefly.gain - before > 0.5 * required else briefly
+    required = least_further_gain(trial, base, briefly) if base else FIRST_GAIN
+    promises = briefly.gain - _gain_of(base) > max(PROMISING, BRIEF_SHARE * required - PROMISING)
+    return fit(near=briefly) if promises else briefly
+
+
+def _of_loop_alone(variant: PricedVariant) -> bool:
+    """Whether a variant changes the loop alone."""
+    return all(t.signature.loop_only for t in variant.terms)
+
+
+def _gain_of(base: Hypothesis | None) -> float:
+    """Held-out nats that a base gains over no effect."""
+    return base.gain if base else 0.0
 
 
 def _best_variants(means: Sequence[Hypothesis]) -> list[Hypothesis]:

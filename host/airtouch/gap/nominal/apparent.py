@@ -1,7 +1,7 @@
 """How strong every effect seems to be in nominal flights, which have none: the scatter that others must exceed."""
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -40,21 +40,58 @@ def baseline_scatter(study: Study, flights: Sequence[Flight], without: Sequence[
 
     It is measured in FLIGHTS of them, each held against the study of all.
     """
-    return scatter_of(map_on_two_cores(partial(_apparent_in, study, without), evenly_chosen(flights)),
-                      any(is_recorded(f) for f in flights), study.vehicle.name, of_one_trim(study.vehicle, flights),
-                      calibrated_on=len(flights))
+    chosen = evenly_chosen(flights)
+    # the longer work of each flight first, so that two processes end together
+    work = [(look, flight) for look in (_strengths, _beside_strengths) for flight in chosen]
+
+    def done(piece: tuple[Callable[[Data, Sequence[str]], Any], Flight]) -> Any:
+        """One look at one flight."""
+        look, flight = piece
+        return look(Data(study, [flight]), without)
+
+    looks = map_on_two_cores(done, work)
+    apparent = [_together(*parts) for parts in zip(looks[:len(chosen)], looks[len(chosen):], strict=True)]
+    return scatter_of(apparent, any(is_recorded(f) for f in flights), study.vehicle.name,
+                      of_one_trim(study.vehicle, flights), calibrated_on=len(flights))
 
 
 def apparent_strengths(data: Data, without: Sequence[str] = ()) -> ApparentStrengths:
     """How strong every effect but those of `without` seems to be in flights that have none."""
-    trial = trial_of(data)
-    singles = every_strength(trial, all_candidates(without))
+    return _together(_strengths(data, without), _beside_strengths(data, without))
+
+
+class _Strengths(NamedTuple):
+    """The first part of `ApparentStrengths`, which comes from fits of every effect."""
+
+    strengths: dict[str, np.ndarray]
+    errors: dict[str, np.ndarray]
+    hidden: frozenset[str]
+
+
+class _BesideStrengths(NamedTuple):
+    """The other part: of the nameless model, and of effects that come and go."""
+
+    rate: float
+    passing: dict[str, float]
+
+
+def _together(one: _Strengths, other: _BesideStrengths) -> ApparentStrengths:
+    """Both parts of one flight."""
+    return ApparentStrengths(one.strengths, one.errors, other.rate, other.passing, one.hidden)
+
+
+def _strengths(data: Data, without: Sequence[str]) -> _Strengths:
+    """The strengths of every effect but those of `without`."""
+    singles = every_strength(trial_of(data), all_candidates(without))
     known = {name: candidate for name, candidate in singles.items() if len(candidate.strength.mean)}
-    return ApparentStrengths(
-        {name: candidate.strength.mean for name, candidate in known.items()},
-        {name: _strength_error(data, candidate) for name, candidate in known.items()},
-        nameless_nats(trial, None) / data.seconds, passing_sizes(data, without),
-        frozenset(name for name, candidate in known.items() if _is_hidden(candidate)))
+    return _Strengths({name: candidate.strength.mean for name, candidate in known.items()},
+                      {name: _strength_error(data, candidate) for name, candidate in known.items()},
+                      frozenset(name for name, candidate in known.items() if _is_hidden(candidate)))
+
+
+def _beside_strengths(data: Data, without: Sequence[str]) -> _BesideStrengths:
+    """The rate of the nameless model, and the sizes of every passing effect but those of `without`."""
+    return _BesideStrengths(nameless_nats(trial_of(data), None) / data.seconds, passing_sizes(data, without))
 
 
 def passing_sizes(data: Data, without: Sequence[str] = ()) -> dict[str, float]:
@@ -74,11 +111,6 @@ def evenly_chosen(flights: Sequence[Flight]) -> list[Flight]:
 def is_recorded(flight: Flight) -> bool:
     """Whether the flight's log is of one of the kinds RECORDERS."""
     return log_kind(flight.log) in RECORDERS
-
-
-def _apparent_in(study: Study, without: Sequence[str], flight: Flight) -> ApparentStrengths:
-    """The apparent strengths of one nominal flight."""
-    return apparent_strengths(Data(study, [flight]), without)
 
 
 def _is_hidden(judged: Hypothesis) -> bool:

@@ -169,8 +169,8 @@ def screen_random(start: RoundStart, variants: Sequence[PricedVariant], means: S
                   ) -> tuple[list[Hypothesis], list[PricedVariant]]:
     """Variants with a random term: of candidates that promise little as hypotheses, of others those to be fitted.
 
-    A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it; the best
-    alone if `every_random`, as the strength of the best of several fits would be biased upwards.
+    A random part is screened beside the base alone. Each mean term within ABOUT_AS_GOOD is then fitted with it; the
+    best alone if `every_random`, as the strength of the best of several fits would be biased upwards.
 
     1. A candidate promises something where its random term or its best mean term gains more than HOPELESS nats; every
        one counts as such if `every_random`.
