@@ -145,12 +145,13 @@ def edge_floor_of(flights: Sequence[Flight], vehicle: Vehicle, calibration: Sequ
     None where they lack edges of a kind of KINDS, or have fewer than LEAST_WINDOWS windows of level flight without one.
     """
     responses: dict[str, list[np.ndarray]] = {k: [] for k in KINDS}
-    without_edge: list[np.ndarray] = []
     for f in flights:
         for e in edges_of(f):
             responses[e.kind].append(response(f.log, vehicle, e.sample))
-        without_edge += [response(f.log, vehicle, at) for at in _without_edge(f, edges_in_air(f))]
-    if not all(responses.values()) or len(without_edge) < LEAST_WINDOWS:
+    if not all(responses.values()):
+        return None
+    without_edge = [response(f.log, vehicle, at) for f in flights for at in _without_edge(f, edges_in_air(f))]
+    if len(without_edge) < LEAST_WINDOWS:
         return None
     known = np.isfinite(np.concatenate([without_edge, *responses.values()])).all(axis=0)
     covariance = np.full((COUNT, COUNT), np.nan)

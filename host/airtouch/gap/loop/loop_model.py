@@ -16,6 +16,7 @@ LOWEST_HZ = 0.05  #: a frequency below it counts as it, so that integrals stay f
 OUTER_S = 0.01  #: s, period of the firmware's position loop and of its estimator's predictions
 IMU_S = 0.001  #: s between samples of the IMU, which the firmware reads at 1 kHz
 OPEN = 0.49  #: share of the IMU's rate from which a low-pass's cutoff lets everything pass, as the simulator has it
+NO_GAIN = 1e-300  #: gain that counts as none: its logarithm is finite
 CROSSING_HZ = np.geomspace(0.3, 45.0, 160)  #: where a loop's gain may last be 1: up to below the log's 50 Hz; chosen
 
 
@@ -67,7 +68,7 @@ def excess_phase(c: Controller, plant: AxisPlant) -> float:
     """
     parts = loop_parts(c, plant, CROSSING_HZ)
     loop = parts.plant * parts.controller
-    phase, log_size = np.unwrap(np.angle(loop)), np.log(np.abs(loop))
+    phase, log_size = np.unwrap(np.angle(loop)), np.log(np.maximum(np.abs(loop), NO_GAIN))
     phase += -2.0 * np.pi * np.ceil(phase[0] / (2.0 * np.pi))
     above = np.flatnonzero(log_size > 0.0)
     if not len(above):

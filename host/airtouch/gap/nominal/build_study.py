@@ -35,11 +35,16 @@ def declared_study(vehicle: Vehicle, flights: Sequence[Flight]) -> Study:
     return study_of(vehicle, (), flights)
 
 
-def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[Flight]) -> Study:
-    """The study of a vehicle with calibrated parameters. flights: declared nominal; none: `study_without_flights`."""
+def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequence[Flight],
+             identified: bool = True) -> Study:
+    """The study of a vehicle with calibrated parameters.
+
+    flights: declared nominal; none: `study_without_flights`; identified: with the loop and the response that they show,
+    which a fit of the vehicle does not need.
+    """
     if not flights:
         return study_without_flights(vehicle, calibration)
-    loop = identify.identify(flights, vehicle, calibration)
+    loop = identify.identify(flights, vehicle, calibration) if identified else None
     replayed = [_replayed_blocks(f, vehicle, calibration) for f in flights]
     response = _response(vehicle, calibration, loop, replayed)
     nominal = [_under_response(n, vehicle, calibration, response) for n in replayed]
@@ -47,7 +52,7 @@ def study_of(vehicle: Vehicle, calibration: tuple[Active, ...], flights: Sequenc
     if loop is not None and response is not None and response.stepped_law is not None:
         over = response.stepped_law.power / np.maximum(response.quiet_law.power, VANISHING_POWER)
         loop = loop.with_steps(response.stepped_law.coherent, over, frequencies(AIR))
-    return Study(vehicle, calibration, loop, floor, response, nominal_echo(flights, vehicle),
+    return Study(vehicle, calibration, loop, floor, response, nominal_echo(flights, vehicle) if identified else None,
                  nominal_count=len(flights))
 
 

@@ -12,7 +12,7 @@ is fitted only where flights rest, which shows it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -52,15 +52,19 @@ VEHICLE_FITS = 2  #: fits of the vehicle, the second against the floor that the 
 class Calibration:
     """Fitted effects that make the declared vehicle the nominal one; intervals are 90 %.
 
-    flights: the nominal ones that were used, without those left out; declared: their study with the vehicle as
-    declared.
+    vehicle: as declared; flights: the nominal ones that were used, without those left out.
     """
 
+    vehicle: Vehicle
     active: tuple[Active, ...]
     parameters: dict[str, Quantity]
     notes: tuple[str, ...]
     flights: tuple[Flight, ...]
-    declared: Study
+
+    @cached_property
+    def declared(self) -> Study:
+        """The study of the flights with the vehicle as declared."""
+        return declared_study(self.vehicle, self.flights)
 
 
 def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = True, without: Sequence[str] = (),
@@ -86,41 +90,40 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     if study.simulated:
         study = _as_simulated(study, nominal, without)
     notes = (*left_out, *lift_note(vehicle, nominal, measured.fitted.terms), *odd_flights(study, nominal))
-    return study, Calibration(study.calibration, _quantities(measured.fitted), notes, tuple(nominal), measured.declared)
+    return study, Calibration(vehicle, study.calibration, _quantities(measured.fitted), notes, tuple(nominal))
 
 
 class _Measured(NamedTuple):
-    """Nominal flights with what they say: of the vehicle as declared, as fitted to them, and the fit."""
+    """Nominal flights with the study of the vehicle fitted to them, and the fit."""
 
     flights: Sequence[Flight]
-    declared: Study
     study: Study
     fitted: FittedTerms
 
 
 def _measured(vehicle: Vehicle, flights: Sequence[Flight], scatter: bool, without: Sequence[str]) -> _Measured:
     """A vehicle fitted to nominal flights, with how they scatter. scatter, without: see `calibrated`."""
-    declared = declared_study(vehicle, flights)
-    study, fitted = _fitted_vehicle(declared, flights)
+    study, fitted = _fitted_vehicle(vehicle, flights)
     study = replace(study, nameless_floor=nameless_floor(Data(study, flights)))
     if scatter:
         measure = partial(baseline_scatter, study, flights, without)
         study = replace(study, scatter=kept_scatter(vehicle, flights, without, measure))
-    return _Measured(flights, declared, study, fitted)
+    return _Measured(flights, study, fitted)
 
 
-def _fitted_vehicle(declared: Study, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:
+def _fitted_vehicle(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:
     """The study of the vehicle with the parameters of PRIORS fitted to nominal flights, and their fit."""
     known_bias = rest(flights)
     chosen, prior = _terms_and_priors(known_bias)
-    study = declared
+    calibration: tuple[Active, ...] = ()
     for _ in range(VEHICLE_FITS):
-        data = Data(replace(study, calibration=(), loop=None, response=None), flights)
-        start = np.concatenate([_scaled(t, study.calibration) for t in chosen])
+        floor = study_of(vehicle, calibration, flights, identified=False)
+        data = Data(replace(floor, calibration=()), flights)
+        start = np.concatenate([_scaled(t, calibration) for t in chosen])
         fitted = fit(data, whole_of(data), chosen, start, prior)
-        fitted = with_mean_thrust(declared.vehicle, flights, fitted, known_bias)
-        study = study_of(declared.vehicle, tuple(t.active() for t in fitted.terms), flights)
-    return study, fitted
+        fitted = with_mean_thrust(vehicle, flights, fitted, known_bias)
+        calibration = tuple(t.active() for t in fitted.terms)
+    return study_of(vehicle, calibration, flights), fitted
 
 
 def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str]) -> Study:
