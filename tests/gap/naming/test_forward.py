@@ -105,6 +105,8 @@ def test_small_gains_are_not_judged_again_beside_a_deviation(select):
     assert rounds == [["b"]]
     _, rounds = select({"a": (200.0, 20.0), "b": (least + 0.1, 9.0), "c": (least - 0.1, 9.0)})
     assert rounds == [["b", "c"]], "beside an effect that is named all are"
+    _, rounds = select({"a": (900.0, 20.0), "b": (least + 0.1, 9.0), "c": (least - 0.1, 9.0), "d": (200.0, 0.0)})
+    assert rounds == [["b", "c", "d"], ["b"]], "d is a deviation beside a named effect"
 
 
 def test_passing_effect_is_the_first_step(select):

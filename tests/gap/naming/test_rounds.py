@@ -8,7 +8,7 @@ import pytest
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming import judging, rounds
 from airtouch.gap.naming.judging import PricedVariant, cross_validated
-from airtouch.gap.naming.policy import FIRST_GAIN, HOPELESS, LEAST_GAIN
+from airtouch.gap.naming.policy import FIRST_GAIN, HOPELESS, LEAST_GAIN, PRICE
 from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.naming.rounds import round_of
 from airtouch.gap.signatures.candidates import all_candidates, terms
@@ -124,3 +124,32 @@ def test_every_strength_has_each_parameter_alone(flying):
         assert together.mean[i] == single.mean[i] and together.variance[i] == single.variance[i]
         assert np.isinf(np.delete(single.variance, i)).all() and not np.delete(single.mean, i).any()
     assert best.gain < FIRST_GAIN, "a nominal flight"
+
+
+def fitted_variants(monkeypatch, study, flights, name):
+    """The best hypothesis of an effect, and the free parameters of each variant that is fitted, briefly or in full."""
+    fits = []
+
+    def counted(on, variant, base, brief=False, near=None):
+        fits.append((variant.terms[0].free, brief))
+        return cross_validated(on, variant, base, brief, near)
+
+    monkeypatch.setattr(rounds, "cross_validated", counted)
+    monkeypatch.setattr(rounds, "map_on_two_cores", lambda function, items: [function(x) for x in items])
+    return round_of(judging.trial_of(Data(study, flights)), candidates_of([name]), None)[name], set(fits)
+
+
+def test_gains_that_change_nothing_together_are_not_tried_alone(flying, monkeypatch):
+    best, fits = fitted_variants(monkeypatch, flying, fly(1, 2), "controller_gain")
+    assert fits == {(terms("controller_gain")[0].signature.free, True)} and not best.full
+
+
+def test_a_gain_that_changes_is_fitted_in_full(flying, monkeypatch):
+    best, fits = fitted_variants(monkeypatch, flying, fly(1, 2, {"controller_gain": {"rate": 0.6}}), "controller_gain")
+    assert {(("rate",), True), (("rate",), False)} <= fits and best.full and best.gain > 100.0
+
+
+def test_effects_at_edges_are_not_fitted_without_an_edge(monkeypatch):
+    best, fits = fitted_variants(monkeypatch, FLOOR, [hover(7)], "range_step")
+    assert not fits and not best.full and best.gain == pytest.approx(-PRICE)
+    assert not best.strength.mean.any() and (np.diag(best.strength.covariance) > 100.0).all()
