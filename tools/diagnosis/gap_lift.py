@@ -19,6 +19,7 @@ down range reads over what it reads at rest, and how far short the down range wo
 
 import argparse
 import csv
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -152,7 +153,11 @@ def _print_passes(folder: Path) -> None:
     vehicle, curve = vehicles.load(vehicles.DEFAULT_VEHICLE), CURVE["ns-34g"]
     low, _ = readable_flights([f for f in collect([folder]) if in_still_air(f)
                                and f.condition.fold in BUILD_FOLDS and f.condition.height == "low"])
-    passes = [p for p in (first_pass(log, vehicle) for log in low.values()) if p is not None]
+    whole = [p for p in (first_pass(log, vehicle) for log in low.values()) if p is not None]
+    passes = [p for p in whole if np.isfinite(p.above_standing_m)]
+    if len(passes) < len(whole):
+        print(f"left out: {len(whole) - len(passes)} of {len(whole)} passes, of flights without a down range at rest",
+              file=sys.stderr)
     print("| down range over that at rest | passes | lift, % of the weight | neural-swarm's 34 g vehicle there | "
           "it has this lift higher by |")
     print("|---|---|---|---|---|")

@@ -29,7 +29,7 @@ from airtouch.detector.evaluation.data.dataset import Condition, FlightFile
 from airtouch.detector.evaluation.evaluate import evaluate_flight
 from airtouch.detector.evaluation.score_report import hit_curve
 from airtouch.errors import in_one_line
-from airtouch.logs.files import write_bytes
+from airtouch.logs.files import make_folder, write_bytes
 from airtouch.report import evaluation_figures, map_figure
 from airtouch.report.style import image
 
@@ -46,6 +46,7 @@ def main() -> int:
     parser.add_argument("--demo", type=Path, default=Path("out/demo/report.html"), help="what `airtouch demo` wrote")
     parser.add_argument("--out", type=Path, default=Path("host/docs/img"), help="folder")
     options = parser.parse_args()
+    make_folder(options.out)
     pictures: dict[str, Callable[[], bytes]] = {
         "virtual-flight": virtual_flight, "zig-zag-map": zig_zag_map, "virtual-errors": virtual_errors}
     lacking = []

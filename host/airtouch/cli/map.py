@@ -13,8 +13,6 @@ from airtouch.extras import need
 from airtouch.logs.files import check_free, write_bytes
 from airtouch.logs.formats.rosbag import is_bag
 
-PICTURES = (".png", ".svg", ".pdf")  #: endings of a plot
-
 
 @click.command(name="map")
 @click.argument("flight", type=click.Path(path_type=Path))
@@ -45,9 +43,10 @@ def command(flight: Path, detector: str, model: Path | None, truth: bool, speed:
     need("map", "a map")
     from airtouch.detector.evaluation import edge_map
     from airtouch.detector.evaluation.evaluate import remarks
+    from airtouch.report.style import FORMATS
 
     out = out or Path(flight.name.removesuffix(".gz")).with_suffix(".geojson")
-    picture = out if out.suffix.lower() in PICTURES else out.with_suffix(".png")
+    picture = out if out.suffix.lower().removeprefix(".") in FORMATS else out.with_suffix(".png")
     out = out.with_suffix(".geojson") if out == picture else out
     for path in (out, picture):
         check_free(path, force)
