@@ -65,6 +65,16 @@ def test_moving_air_has_drag_beside_it_unless_drag_is_left_out():
         assert all(len(v) == 1 for v in all_candidates(["rotor_drag"])[name] + passing_variants()[name])
 
 
+def test_a_passing_wind_blows_along_the_ground():
+    """Its vertical part would act through the tilt alone; one that always acts has it. Others free what they do."""
+    assert {t.free for t, *_ in passing_variants()["wind"]} == {("x", "y")}
+    assert {t.free for t, *_ in all_candidates()["wind"]} == {("x", "y", "z")}
+    assert {t.free for t, *_ in passing_variants()["downwash"]} == {("strength",)}
+    x = Quantity(0.5, 0.3, 0.7, "m/s")
+    for seconds, free in (((), ("x", "y", "z")), ((("a.csv", 1.0, 2.0),), ("x", "y"))):
+        assert term_of(NamedEffect("wind", {"x": x}, seconds)).free == free
+
+
 @pytest.mark.parametrize(("name", "where"), [("mass", MEAN), ("gust", SPECTRUM), ("packet_loss", CLOCK)])
 def test_an_effect_shows_where_its_record_says(name, where):
     assert shows_in(get(name)) == where and all(t.shows_in == where for t in terms(name))

@@ -54,8 +54,13 @@ def passing_variants(without: Iterable[str] = ()) -> dict[str, list[Terms]]:
         if name in EFFECTS and name not in without:
             random: list[Terms] = [()] if SIGNATURES[name].without_random is None else \
                 [(part,) for part in random_parts_of(name)]
-            out[name] = [(t, *part) for part in random for t in terms(name)]
+            out[name] = [(_passing(t), *part) for part in random for t in terms(name)]
     return out
+
+
+def _passing(term: Term) -> Term:
+    """The term with the parameters free that a passing effect frees; its gate is that of the term."""
+    return replace(term, free=term.signature.free_if_passing or term.free)
 
 
 def terms(name: str) -> list[Term]:
@@ -119,6 +124,7 @@ def term_of(effect: NamedEffect) -> Term:
         return sum(abs(values.get(k, v) - v) for k, v in term.values.items() if k not in term.free)
 
     nearest = min(terms(effect.name), key=distance)
+    nearest = _passing(nearest) if effect.seconds else nearest
     return replace(nearest, values={**nearest.values, **values}, gate=effect.seconds)
 
 

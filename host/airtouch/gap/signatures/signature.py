@@ -61,6 +61,7 @@ class Signature:
     spectrum: closed form of a random effect's spectrum; "" where it is run on the flight's signals instead.
     loss_runs: for what loses samples in runs, the parameters that say so.
     may_pass: whether it may act in a part of a flight only.
+    free_if_passing: parameters that a fit frees where it does; () for those of `free`.
 
     What is beside it:
     without_random: values at which the effect has no random part, for a mean part whose random part is a term of its
@@ -88,6 +89,7 @@ class Signature:
     spectrum: str = ""
     loss_runs: LossRuns | None = None
     may_pass: bool = False
+    free_if_passing: tuple[str, ...] = ()
     without_random: Mapping[str, float] | None = None
     random_variants: tuple[Mapping[str, float], ...] = ({},)
     always_random: bool = False
@@ -147,6 +149,7 @@ SIGNATURES: dict[str, Signature] = {
     "rotor_drag": Signature(("horizontal", "vertical")),
     "wind": Signature(
         ("x", "y", "z"), may_pass=True,
+        free_if_passing=("x", "y"),  # z acts through the tilt alone: in a few seconds of it any value fits
         variants=({}, {"lever": 0.015}),  # a known height: free, any torque would be wind
         companion="rotor_drag"),  # air moves the vehicle through its rotors' drag
     "gust": Signature(
