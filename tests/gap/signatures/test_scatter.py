@@ -198,6 +198,17 @@ def test_a_passing_effect_of_a_nominal_flight_is_no_news_in_the_next():
     assert np.mean(beyond) < 0.06
 
 
+def test_a_wind_is_no_news_where_nominal_flights_have_gusts():
+    """Air that moves has drag beside it, steady or not: the wider sizes of the two count for both, in either order."""
+    for has in ("gust", "wind"):
+        flights = [ApparentStrengths({}, {}, 0.0, {"wind": 0.0, "gust": 0.0, "downwash": 0.1} | {has: size})
+                   for size in (2.0, 3.0, 4.0, 5.0)]
+        scatter = scatter_of(flights, True)
+        assert scatter.passing["wind"] == scatter.passing["gust"] and scatter.passing["gust"][0] > 0.5
+        assert scatter.passing["downwash"][0] < 0.5
+        assert scatter.unusual({"wind": 2.0}) == scatter.unusual({"gust": 2.0}) < scatter.unusual({"downwash": 2.0})
+
+
 def test_a_hundredth_of_nominal_flights_is_out_of_the_ordinary():
     rng = np.random.default_rng(11)
     sizes = np.maximum(1.0 + 0.2 * rng.normal(size=100_000), 0.0)

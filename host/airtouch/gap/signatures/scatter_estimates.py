@@ -11,6 +11,7 @@ from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, standard_deviation, updated
 from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, fourth_root, table
+from airtouch.gap.signatures.signature import SIGNATURES
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
 RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen
@@ -50,7 +51,7 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     means = _updated_means(update)
     least = LEAST if simulated else LEAST_RECORDED
     rms = _updated_rms(update, means, math.sqrt(widening), least) | _of_hidden(update)
-    passing = {n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()}
+    passing = _air_as_one({n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()})
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
 
@@ -153,6 +154,24 @@ def _alike_as_one(rms: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return out
 
 
+def _air_as_one(sizes: Mapping[str, Pair]) -> dict[str, Pair]:
+    """Sizes of passing effects, in which effects with one companion have those that reach highest.
+
+    Moving air has drag beside it, whether it is steady or gusts: what nominal flights have of the one may be the other
+    in the next flight. Of a wind alone most have none at all, and a few much, which no mean and deviation describe.
+    """
+    out = dict(sizes)
+    for companion in {SIGNATURES[n].companion for n in sizes if n in SIGNATURES} - {""}:
+        same = [n for n in sizes if n in SIGNATURES and SIGNATURES[n].companion == companion]
+        out |= dict.fromkeys(same, _highest(sizes[n] for n in same))
+    return out
+
+
+def _highest(pairs: Iterable[Pair]) -> Pair:
+    """The pair that reaches highest: mean and one standard deviation."""
+    return max(pairs, key=lambda pair: pair[0] + pair[1])
+
+
 def _column(flights: Sequence[ApparentStrengths], name: str, what: str, k: int) -> np.ndarray:
     """Parameter k of an effect, "strengths" or "errors", in every flight that has it (n,)."""
     return np.array([getattr(f, what)[name][k] for f in flights if k < len(f.strengths[name])])
@@ -198,10 +217,6 @@ def _widest(classes: Sequence[Scatter]) -> Scatter:
     names = {n for c in classes for n in c.rms}
     rms = {n: np.max([c.rms[n] for c in classes if n in c.rms], axis=0) for n in sorted(names)}
 
-    def highest(rates: Iterable[Pair]) -> Pair:
-        """The pair that reaches highest: mean and one standard deviation."""
-        return max(rates, key=lambda r: r[0] + r[1])
-
-    passing = {n: highest(c.passing[n] for c in classes if n in c.passing)
+    passing = {n: _highest(c.passing[n] for c in classes if n in c.passing)
                for n in sorted({n for c in classes for n in c.passing})}
-    return Scatter(rms, min(c.freedom for c in classes), highest(c.rate for c in classes), passing)
+    return Scatter(rms, min(c.freedom for c in classes), _highest(c.rate for c in classes), passing)
