@@ -48,7 +48,7 @@ ABOUT_AS_GOOD = 3.0
 #: effects that screening takes for weaker than they are
 PROMISING = 0.5 * FIRST_GAIN
 #: share of what it must gain, less PROMISING, that an effect of the loop must gain by a brief fit to be fitted in full;
-#: chosen for time: in 109 such fits of seven recorded flights the full one gained at most 1.25 times as much and 6 nats
+#: chosen for time: in 113 such fits of seven recorded flights the full one gained at most 1.25 times as much and 6 nats
 BRIEF_SHARE = 0.75
 #: hypotheses judged to first order, the best of them, among which those that gain PROMISING are fitted in full; others
 #: are fitted beside these: random effects that promise something, what only a fit can judge, and names that a round is
