@@ -3,7 +3,7 @@
     python tools/benchmarks/bench_diagnosis.py [NEURALSWARM] [--runs 5]    # two minutes a run, one without recordings
 
 The packaged flight, a simulated one of 25 s with four baseline flights; where the data set of neural-swarm is, two
-recorded ones of 15 to 20 s with three as well, with ground effect and below another vehicle. JSON and report are
+recorded ones of 20 s with three as well, with ground effect and below another vehicle. JSON and report are
 written too. Each run is a process of its own, on all processors and on one in turn, after one warm-up that compiles:
 with the first flight against a baseline, and with a further one, for which the baseline's scatter is kept. Nothing else
 should run beside it. host/docs/gap-real.md has the times.
