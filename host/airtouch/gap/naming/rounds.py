@@ -29,8 +29,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypo
     """
     start = start_of(trial, base)
     variants, not_fitted = _screen(start, candidates, progress, promising)
-    variants = _without_hopeless_parts(trial, variants, base)
-    fitted = map_on_two_cores(lambda v: _fit_variant(trial, v, base), variants)
+    fitted = map_on_two_cores(partial(_fit_variant, start), _without_hopeless_parts(start, variants))
     best = best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
     return with_evidence(trial.data, best, start.gain)
 
@@ -64,40 +63,34 @@ def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     return [*screened.fit_only, *random, *means_to_fit], not_fitted
 
 
-def _without_hopeless_parts(trial: Trial, variants: Sequence[PricedVariant], base: Hypothesis | None,
-                            ) -> list[PricedVariant]:
+def _without_hopeless_parts(start: RoundStart, variants: Sequence[PricedVariant]) -> list[PricedVariant]:
     """The variants without those that free one parameter of an effect of the loop whose parameters gain nothing at all.
 
     What all of them together do not gain by a brief fit, none gains alone.
     """
     hopeless = {v.name for v in variants if _is_tried_alone(v) and _of_loop_alone(v)
-                and cross_validated(trial, v, base, brief=True).gain - _gain_of(base) <= PROMISING}
+                and cross_validated(start.trial, v, start.base, brief=True).gain - start.gain <= PROMISING}
     return [v for v in variants if v.name not in hopeless or _is_tried_alone(v)]
 
 
-def _fit_variant(trial: Trial, variant: PricedVariant, base: Hypothesis | None) -> Hypothesis:
-    """A variant fitted beside a base.
+def _fit_variant(start: RoundStart, variant: PricedVariant) -> Hypothesis:
+    """A variant fitted beside the base of a round.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
     where it may then gain what it must: BRIEF_SHARE of that, less PROMISING.
     """
-    fit = partial(cross_validated, trial, variant, base)
+    fit = partial(cross_validated, start.trial, variant, start.base)
     if not _of_loop_alone(variant):
         return fit()
     briefly = fit(brief=True)
-    required = least_further_gain(trial, base, briefly) if base else FIRST_GAIN
-    promises = briefly.gain - _gain_of(base) > max(PROMISING, BRIEF_SHARE * required - PROMISING)
+    required = least_further_gain(start.trial, start.base, briefly) if start.base else FIRST_GAIN
+    promises = briefly.gain - start.gain > max(PROMISING, BRIEF_SHARE * required - PROMISING)
     return fit(near=briefly) if promises else briefly
 
 
 def _of_loop_alone(variant: PricedVariant) -> bool:
     """Whether a variant changes the loop alone."""
     return all(t.signature.loop_only for t in variant.terms)
-
-
-def _gain_of(base: Hypothesis | None) -> float:
-    """Held-out nats that a base gains over no effect."""
-    return base.gain if base else 0.0
 
 
 def _best_variants(means: Sequence[Hypothesis]) -> list[Hypothesis]:
