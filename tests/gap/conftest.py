@@ -10,8 +10,12 @@ from shared_fixture import once
 
 @pytest.fixture(scope="session")
 def study(tmp_path_factory):
-    """A vehicle calibrated on five nominal flights."""
-    return once(tmp_path_factory, "study", lambda: calibrate.calibrated(VEHICLE, fly(5, 41))[0])
+    """A vehicle calibrated on five nominal flights, with the scatter that others would measure when they need it."""
+    def measured():
+        on_demand = calibrate.calibrated(VEHICLE, fly(5, 41))[0]
+        return on_demand.with_scatter(on_demand.scatter)
+
+    return once(tmp_path_factory, "study", measured)
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from hovers import FLOOR
 
 def study_of(exact, by_firmware=True):
     """A study whose nominal flights scatter as a simulator's do, or not, with this project's firmware or another."""
-    return replace(FLOOR, scatter=SimpleNamespace(exact=exact), loop=SimpleNamespace(by_firmware=by_firmware))
+    return replace(FLOOR.with_scatter(SimpleNamespace(exact=exact)), loop=SimpleNamespace(by_firmware=by_firmware))
 
 
 def test_flights_of_unknown_scatter_count_as_recorded():

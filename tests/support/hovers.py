@@ -91,7 +91,7 @@ def select_from(flights, names, study=FLOOR, without=ALWAYS, progress=lambda _: 
 
 def scattered(exact=False, **rms):
     """The study with a scatter of nominal flights: recorded ones, or a simulator's with the same models (`exact`)."""
-    return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=exact))
+    return FLOOR.with_scatter(Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=exact))
 
 
 def own_gain(data, terms, first=None):

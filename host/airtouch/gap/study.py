@@ -1,7 +1,8 @@
 """The study of a vehicle: the model and the floor that flights are compared with."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,18 @@ from airtouch.vehicle import Vehicle
 if TYPE_CHECKING:  # layers above this one, for types only
     from airtouch.gap.nameless.columns import NamelessFloor
     from airtouch.gap.relations.library import Library
+
+
+@dataclass(frozen=True, eq=False)
+class ScatterOnDemand:
+    """A scatter that `measure` gives when it is first asked for: that takes seconds, and not every answer needs it."""
+
+    measure: Callable[[], Scatter]
+
+    @cached_property
+    def scatter(self) -> Scatter:
+        """The scatter, measured once."""
+        return self.measure()
 
 
 @dataclass(frozen=True)
@@ -42,7 +55,10 @@ class Study:
 
     - nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`). None: that
       model takes them to have no scatter.
-    - scatter: how strong effects seem to be in nominal flights. None: nobody measured it, as for a map.
+    - simulated: whether its nominal flights are those of a simulator, which are all drawn alike. Flights of a study
+      without nominal flights, or with a single one, count as recorded.
+    - on_demand: how strong effects seem to be in nominal flights, to be read by `scatter`. None: nobody measures it, as
+      for a map.
     - relations: what was learned of such flights (`relations.library.Library`). None: recorded flights, or no library
       holds for them; then the replay decides.
 
@@ -60,7 +76,8 @@ class Study:
     echo: NominalEcho | None = None
     nameless_floor: "NamelessFloor | None" = None
     nominal_count: int = 0
-    scatter: Scatter | None = None
+    simulated: bool = False
+    on_demand: ScatterOnDemand | None = None
     relations: "Library | None" = None
     overhead: Gate = ()
 
@@ -77,14 +94,20 @@ class Study:
         return self.floor.offset_beyond if self.simulated else self.floor.offset
 
     @property
-    def simulated(self) -> bool:
-        """Whether its nominal flights are those of a simulator, which are all drawn alike.
+    def scatter(self) -> Scatter | None:
+        """How strong effects seem to be in nominal flights; None where nobody measures it."""
+        return None if self.on_demand is None else self.on_demand.scatter
 
-        Flights of a study without nominal flights, or with a single one, count as recorded.
-        """
-        return self.scatter is not None and self.scatter.exact
+    def with_scatter(self, scatter: Scatter) -> "Study":
+        """The study with a scatter that is known already; whether it is of simulated flights goes with it."""
+        return replace(self, simulated=scatter.exact, on_demand=ScatterOnDemand(partial(_known, scatter)))
 
     @property
     def same_models(self) -> bool:
         """Whether the loop is this project's firmware as well, so that every model is the simulator's own."""
         return self.simulated and self.loop is not None and self.loop.by_firmware
+
+
+def _known(scatter: Scatter) -> Scatter:
+    """A scatter as what `ScatterOnDemand` asks; a function of this module, so that a study can be sent elsewhere."""
+    return scatter

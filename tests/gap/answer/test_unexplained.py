@@ -140,7 +140,7 @@ def test_an_unsteady_flight_has_the_seconds_and_the_channel_that_is_shaken():
     flights = [flight(40.0, noise(40.0, 1.0, 5), noise(40.0, 0.1, 4), name="calm.csv"),
                flight(40.0, noise(40.0, 1.0, 6), shaken, name="shaken.csv")]
     scatter = Scatter({}, 8.0, (0.0, 0.0), {UNSTEADY_TORQUE: (-3.5, 0.2), UNSTEADY_LIFT: (-2.6, 0.2)})
-    study = replace(STUDY, scatter=scatter)
+    study = STUDY.with_scatter(scatter)
     rarity = unsteadiness_rarity(Data(study, flights))
     assert rarity.rarest == UNSTEADY_TORQUE and rarity.nats > rarity.limit
     (entry,) = unexplained(study, flights, selection(rarity), [])

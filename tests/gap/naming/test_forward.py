@@ -43,6 +43,8 @@ def select(monkeypatch):
 
         rounds, added = [], []
         monkeypatch.setattr(module, "round_of", round_of)
+        monkeypatch.setattr(module, "best_beside", round_of)
+        monkeypatch.setattr(module, "with_evidence", lambda data, best, base_gain: best)
         trial = SimpleNamespace(policy=replace(POLICY, least_evidence=least_evidence),
                                 data=SimpleNamespace(study=SimpleNamespace(loop=None)))
         return forward(Search(trial, dict.fromkeys(candidates, [()]), lambda _: None), passing), rounds

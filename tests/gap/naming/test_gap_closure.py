@@ -86,7 +86,7 @@ def test_effects_of_the_loop_together_must_close_as_much_as_one():
 @pytest.fixture(scope="module")
 def delayed(study):
     """A study as of recorded flights, a flight with a delay held against it, and what is selected there."""
-    recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    recorded = study.with_scatter(replace(study.scatter, exact=False))
     data = Data(recorded, fly(1, 93, {"actuator_delay": {"delay": 0.005}}))
     return recorded, data, select(data, all_candidates())
 

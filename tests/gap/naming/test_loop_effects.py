@@ -1,6 +1,5 @@
 """Effects in flights whose control loop is modelled: those of the loop, which the commands show, and another."""
 
-from dataclasses import replace
 
 import pytest
 
@@ -41,7 +40,7 @@ def test_effect_that_only_the_commands_show_is_fitted(flying, tmp_path):
 
 @pytest.mark.parametrize("simulated", [True, False])
 def test_changed_loop_is_assumed_in_recorded_flights(flying, simulated):
-    study = replace(flying, scatter=Scatter({}, 8.0, (0.0, 0.0), exact=simulated))
+    study = flying.with_scatter(Scatter({}, 8.0, (0.0, 0.0), exact=simulated))
     selection, _ = select_from(fly(1, 2, {"sensor_latency": {"delay": 0.008}}), ("sensor_latency",), study)
     assert [s.name for s in selection.steps] == ["sensor_latency"] and selection.spectrum_is_assumed is not simulated
 

@@ -34,7 +34,7 @@ def test_passing_effect_is_named_with_its_seconds():
 def test_size_must_exceed_that_of_nominal_flights(size, named):
     """size: mean and standard deviation of `size_of` in nominal flights."""
     study = scattered()
-    study = replace(study, scatter=replace(study.scatter, passing={"downwash": size}))
+    study = study.with_scatter(replace(study.scatter, passing={"downwash": size}))
     selection, data = select_from([with_a_push(9.0, 15.0)], ("mass",), study, ())
     assert [s.name for s in selection.named_steps] == ["downwash"] * named
     assert ("downwash" in selection.single_effects) == named
@@ -89,7 +89,7 @@ def test_passing_effect_is_dropped_where_its_leave_one_out_size_is_nominal(nomin
         """FALSE_SHARE of the nominal flights have a larger one."""
         study, spread = scattered(**nominal_sizes), 0.1
         middle = size - spread * student.ppf(1.0 - FALSE_SHARE, study.scatter.freedom)
-        study = replace(study, scatter=replace(study.scatter, passing={"downwash": (middle, spread)}))
+        study = study.with_scatter(replace(study.scatter, passing={"downwash": (middle, spread)}))
         return {s.name for s in select_from(flights, ("mass",), study, ())[0].steps}
 
     assert names_where_nominal_flights_have(0.5 * (share + gain)) == {"mass"}

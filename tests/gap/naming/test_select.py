@@ -159,7 +159,7 @@ def test_candidates_beside_a_base():
 
 def simulated(**rms):
     """A study of flights that come from the models which effects are fitted with."""
-    return replace(FLOOR, scatter=Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=True))
+    return FLOOR.with_scatter(Scatter({n: np.array(r) for n, r in rms.items()}, 8.0, (0.0, 0.0), exact=True))
 
 
 def test_calm_is_a_gap_in_simulated_flights():

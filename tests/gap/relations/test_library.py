@@ -113,7 +113,7 @@ def test_it_is_not_asked_where_it_cannot_answer(study):
     data = Data(study, fly(1, 79))
     assert inference_of(data, list(all_candidates())) is not None
     assert inference_of(data, [*all_candidates(), "an effect of one's own"]) is None
-    recorded = replace(study, scatter=replace(study.scatter, exact=False))
+    recorded = study.with_scatter(replace(study.scatter, exact=False))
     assert inference_of(replace(data, study=recorded), list(all_candidates())) is None
 
 

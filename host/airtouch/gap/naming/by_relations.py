@@ -9,7 +9,7 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.naming.forward import Search
 from airtouch.gap.naming.records import Hypothesis, NamelessGain, Selection, Step
-from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.rounds import best_beside
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference, infer
 from airtouch.gap.signatures.term import Terms
@@ -33,18 +33,20 @@ def inference_of(data: Data, names: Sequence[str]) -> Inference | None:
 def selection_by_relations(search: Search, inference: Inference, rank_all: bool = True) -> Selection:
     """The selection of the effects that an inference names, each fitted beside those before it.
 
+    Their evidence is that of the relations; the others have none, so that no scatter of nominal flights is needed.
+
     rank_all: with every candidate judged alone; else those stand in it as not fitted.
     """
     steps: list[Step] = []
     for effect in dict.fromkeys(c.effect for c in inference.classes):
         own, all_variants = [c for c in inference.classes if c.effect == effect], search.candidates[effect]
         variants = {effect: matching(own[0], all_variants) if len(own) == 1 else list(all_variants)}
-        judged = round_of(search.trial, variants, steps[-1] if steps else None, search.progress, promising=(effect,))
+        judged = best_beside(search.trial, variants, steps[-1] if steps else None, search.progress, (effect,))
         if effect in judged:
             steps.append(Step.of(replace(judged[effect], evidence=inference.evidence[effect])))
     not_fitted = {name: Hypothesis(name, (), 0.0, full=False) for name in search.candidates}
     return Selection(
-        single_effects=search.single_effects if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
+        single_effects=search.fitted_alone if rank_all else not_fitted, steps=tuple(steps), nameless=NamelessGain(),
         halves=search.trial.halves, least_nats=search.least_nats, spectrum_is_assumed=False,
         inference=inference, library_holds=True, policy=search.trial.policy)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+from airtouch.gap.naming.evidence import with_evidence
 from airtouch.gap.naming.judging import Trial
 from airtouch.gap.naming.policy import (
     CERTAIN,
@@ -18,7 +19,7 @@ from airtouch.gap.naming.policy import (
     WORTH_AGAIN,
 )
 from airtouch.gap.naming.records import Hypothesis, Step
-from airtouch.gap.naming.rounds import round_of
+from airtouch.gap.naming.rounds import best_beside, round_of
 from airtouch.gap.naming.thresholds import is_random_misfit, least_further_gain
 from airtouch.gap.signatures.candidates import is_random
 from airtouch.gap.signatures.term import Terms
@@ -36,9 +37,14 @@ class Search:
     progress: Callable[[str], None]
 
     @cached_property
+    def fitted_alone(self) -> Mapping[str, Hypothesis]:
+        """Every candidate alone, by name, without evidence; worked out when it is first asked for."""
+        return best_beside(self.trial, self.candidates, None, self.progress)
+
+    @cached_property
     def single_effects(self) -> Mapping[str, Hypothesis]:
         """Every candidate judged alone, by name; worked out when it is first asked for."""
-        return round_of(self.trial, self.candidates, None, self.progress)
+        return with_evidence(self.trial.data, self.fitted_alone, 0.0)
 
     @cached_property
     def least_nats(self) -> Mapping[str, float]:

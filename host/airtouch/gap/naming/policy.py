@@ -199,9 +199,11 @@ def unknown_limit(study: Study, seconds: float) -> UnknownLimit:
     over no effect counts as well, and what it gains in nominal flights, though they are simulated.
     """
     n = study.nominal_count
-    nominal_gain = 0.0 if study.scatter is None else study.scatter.allowed(seconds, UNKNOWN_GAIN)
+    # of simulated flights it does not count, and is not asked for, as to measure their scatter takes seconds
+    scatter = None if n > 1 and study.simulated else study.scatter
+    nominal_gain = 0.0 if scatter is None else scatter.allowed(seconds, UNKNOWN_GAIN)
     if n < 2:
         return UnknownLimit(UNKNOWN_ALONE, share_over_none=UNKNOWN_ASSUMED, nominal_gain=nominal_gain)
     exactness = SAME_MODELS if study.same_models else 1.0
     return UnknownLimit(UNKNOWN_GAIN * (n + 1) / (n - 1), UNKNOWN_SHARE * exactness, UNKNOWN_ASSUMED * exactness,
-                        nominal_gain=0.0 if study.simulated else nominal_gain)
+                        nominal_gain=nominal_gain)

@@ -22,7 +22,15 @@ from airtouch.gap.signatures.term import Terms
 
 def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypothesis | None,
              progress: Callable[[str], None] = lambda _: None, promising: Container[str] = ()) -> dict[str, Hypothesis]:
-    """The best hypothesis of every candidate beside a base, by name, with its evidence.
+    """The best hypothesis of every candidate beside a base, by name, with its evidence: see `best_beside`."""
+    best = best_beside(trial, candidates, base, progress, promising)
+    return with_evidence(trial.data, best, base.gain if base else 0.0)
+
+
+def best_beside(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypothesis | None,
+                progress: Callable[[str], None] = lambda _: None, promising: Container[str] = (),
+                ) -> dict[str, Hypothesis]:
+    """The best hypothesis of every candidate beside a base, by name, without evidence.
 
     candidates: variants by name; base: None for no effect; progress: called with every name; promising: names that are
     judged in full whatever screening says.
@@ -30,8 +38,7 @@ def round_of(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: Hypo
     start = start_of(trial, base)
     variants, not_fitted = _screen(start, candidates, progress, promising)
     fitted = map_on_two_cores(partial(_fit_variant, start), _without_hopeless_parts(start, variants))
-    best = best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
-    return with_evidence(trial.data, best, start.gain)
+    return best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
 
 
 def every_strength(trial: Trial, candidates: Mapping[str, Sequence[Terms]]) -> dict[str, Hypothesis]:

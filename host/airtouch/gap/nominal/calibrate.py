@@ -23,16 +23,16 @@ from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.features.flight_features import features
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.nameless.model import nameless_floor
-from airtouch.gap.nominal.apparent import baseline_scatter
+from airtouch.gap.nominal.apparent import baseline_scatter, is_recorded
 from airtouch.gap.nominal.build_study import declared_study, study_of
-from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, MOST_LEFT_OUT, odd_flights, split_unlike
+from airtouch.gap.nominal.consistency import FAR, FAR_SIMULATED, MOST_LEFT_OUT, odd_flights, of_one_trim, split_unlike
 from airtouch.gap.nominal.kept_scatter import kept_scatter
 from airtouch.gap.nominal.mean_thrust import BIAS_STD, SEEN_AT_REST, lift_note, rest, with_mean_thrust
-from airtouch.gap.relations.library import library_for
+from airtouch.gap.relations.library import Library, library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import all_candidates, terms
 from airtouch.gap.signatures.term import Term
-from airtouch.gap.study import Study
+from airtouch.gap.study import ScatterOnDemand, Study
 from airtouch.simulation.effects import Active
 from airtouch.vehicle import Vehicle
 
@@ -72,8 +72,9 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
     """The study of a vehicle fitted to nominal flights, and the calibration.
 
     Flights that cannot be nominal like the others (a touch of the ground, a swapped propeller) are left out and named,
-    as long as most agree. scatter: measure as well how strong every effect but those of `without` seems to be in them
-    (seconds a flight; naming effects needs it, a map does not).
+    as long as most agree. scatter: the study says as well how strong every effect but those of `without` seems to be in
+    them. To measure it takes seconds a flight: that is done at once, but for simulated flights for which a library of
+    relations holds when it is first asked for.
     """
     alike, left_out = split_unlike(vehicle, flights, FAR)
     measured = _measured(vehicle, alike, scatter, without)
@@ -105,10 +106,25 @@ def _measured(vehicle: Vehicle, flights: Sequence[Flight], scatter: bool, withou
     """A vehicle fitted to nominal flights, with how they scatter. scatter, without: see `calibrated`."""
     study, fitted = _fitted_vehicle(vehicle, flights)
     study = replace(study, nameless_floor=nameless_floor(Data(study, flights)))
-    if scatter:
-        measure = partial(baseline_scatter, study, flights, without)
-        study = replace(study, scatter=kept_scatter(vehicle, flights, without, measure))
-    return _Measured(flights, study, fitted)
+    return _Measured(flights, _with_scatter(study, vehicle, flights, without) if scatter else study, fitted)
+
+
+def _with_scatter(study: Study, vehicle: Vehicle, flights: Sequence[Flight], without: Sequence[str]) -> Study:
+    """The study with how nominal flights scatter, and with whether they are simulated.
+
+    Where a library of relations holds they are, and nothing is measured yet. vehicle: as declared.
+    """
+    measure = partial(kept_scatter, vehicle, flights, without, partial(baseline_scatter, study, flights, without))
+    if _library(vehicle, flights) is None:
+        return study.with_scatter(measure())
+    return replace(study, simulated=True, on_demand=ScatterOnDemand(measure))
+
+
+def _library(vehicle: Vehicle, flights: Sequence[Flight]) -> Library | None:
+    """The library of relations that holds for flights of a vehicle; None where none does, as for recorded ones."""
+    if any(is_recorded(f) for f in flights) or not of_one_trim(vehicle, flights):
+        return None
+    return library_for(vehicle, [features(f, vehicle) for f in flights])
 
 
 def _fitted_vehicle(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study, FittedTerms]:
@@ -131,7 +147,7 @@ def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str
 
     without: effects that are no candidates; of the others the library learns those that it lacks.
     """
-    relations = library_for(study.vehicle, [features(f, study.vehicle) for f in flights])
+    relations = _library(study.vehicle, flights)
     names = all_candidates(without)
     if relations is not None and not relations.effects.issuperset(names):
         from airtouch.gap.relations.own_effect import completed  # a second of imports, which few need

@@ -120,8 +120,8 @@ def with_overhead(study: Study, flight: Flight, seconds: Sequence[tuple[float, f
     sizes = [_size(data, g) for g in rest if sum(b - a for _, a, b in g) > LEAST_FRACTION * duration]
     middle, spread = study.scatter.passing[OVERHEAD]
     passing = {**study.scatter.passing, KNOWN_OVERHEAD: (float(np.median(sizes)) if sizes else middle, spread)}
-    return replace(study, overhead=tuple((flight.name, a, b) for a, b in seconds),
-                   scatter=replace(study.scatter, passing=passing))
+    return replace(study.with_scatter(replace(study.scatter, passing=passing)),
+                   overhead=tuple((flight.name, a, b) for a, b in seconds))
 
 
 def _size(data: Data, gate: Gate) -> float:
