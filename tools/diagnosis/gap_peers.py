@@ -1,26 +1,30 @@
-"""Prints diagnoses of flights made with other people's simulators, each alone: first answers, gap closed.
+"""Prints diagnoses of flights made with other people's simulators, each alone: first answers, gap closed, parameters.
 
     python tools/diagnosis/gap_peers.py [FLIGHTS/peers] [--keep x.jsonl]    # 8 to 28 s of one core a flight
 
 Each flight is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
-Names of one thing (`alike.ALIKE`) count as one. Its figures are in host/docs/gap-real.md.
+Names of one thing (`alike.ALIKE`) count as one. Parameters are scored where the effect has the label's name and the
+manifest's strength is a parameter of the registry's (`recordings.peers`). Its figures are in host/docs/gap-real.md.
 """
 
 import argparse
 import os
 import statistics
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+import numpy as np
+
 from airtouch import vehicle as vehicles
 from airtouch.cli.shared.flights import check_data_set
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
-from airtouch.gap.sealed.intervals import share_text
+from airtouch.gap.sealed.intervals import median, share_in_groups, share_text
+from airtouch.gap.sealed.score import relative_error
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.logs import read
 from airtouch.logs.files import check_free
@@ -37,7 +41,8 @@ class PeerResult:
 
     strength: the effect's, as the manifest has it; named: effects with their fitted parameters, as text; ranked:
     likeliest effects, the likeliest first, three at most; shrink, control: fraction of the gap that the named effects
-    close, and a wrong one; None where the diagnosis has none.
+    close, and a wrong one; None where the diagnosis has none. drawn: parameters as the manifest has them; known: of
+    these the ones that the diagnosis gives with an interval, as JSON, empty where it names another effect.
     """
 
     file: str
@@ -49,6 +54,8 @@ class PeerResult:
     shrink: float | None
     control: float | None
     cpu_s: float
+    drawn: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def within(self, n: int) -> bool:
         """Whether the truth is among the n likeliest."""
@@ -66,13 +73,18 @@ def diagnose_flight(folder: Path, label: peers.Row) -> PeerResult:
     began = time.process_time()
     diagnosis = diagnose([read(folder / label["file"])], vehicles.load(peers.vehicle_file(folder, label)),
                          [read(path) for path in peers.baseline(folder, label)])
+    drawn, true_name = peers.true_parameters(label), peers.truth(label)
+    parameters = next((e.parameters for e in diagnosis.effects if e.name == true_name), {})
+    known = {k: {"value": q.value, "low": q.low, "high": q.high} for k, q in parameters.items()
+             if k in drawn and q.low is not None and q.high is not None}
     named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
                                                if q.low is not None) for e in diagnosis.effects)
     return PeerResult(
-        label["file"], peers.truth(label), f"{float(label['strength']):.3g} {label['unit'].split(',')[0][:24]}",
+        label["file"], true_name, f"{float(label['strength']):.3g} {label['unit'].split(',')[0][:24]}",
         diagnosis.verdict, named, [r.name for r in diagnosis.ranking[:3]],
         None if diagnosis.shrink is None else diagnosis.shrink.value,
-        None if diagnosis.control is None else diagnosis.control.closure.shrink.value, time.process_time() - began)
+        None if diagnosis.control is None else diagnosis.control.closure.shrink.value, time.process_time() - began,
+        drawn, known)
 
 
 def summary(results: Sequence[PeerResult]) -> str:
@@ -80,6 +92,7 @@ def summary(results: Sequence[PeerResult]) -> str:
     first, three = (sum(r.within(n) for r in results) for n in (1, 3))
     n = len(results)
     text = f"first answer {share_text(first, n)}; first three {share_text(three, n)} (95 % intervals)"
+    text += _parameters([r for r in results if r.within(1) and r.known])
     right = [r for r in results if r.within(1) and r.shrink is not None]
     if not right:
         return text
@@ -88,6 +101,18 @@ def summary(results: Sequence[PeerResult]) -> str:
     return (f"{text}\ngap closed with the right effect: median {statistics.median(shrinks):.2f}, "
             f">= {GOAL:.2f} in {sum(s >= GOAL for s in shrinks)} of {len(shrinks)}"
             + (f"; with a wrong one at most {max(controls):.2f}" if controls else ""))
+
+
+def _parameters(right: Sequence[PeerResult]) -> str:
+    """A line on the parameters of right answers, as of a sealed set: median error, share within 90 % intervals."""
+    if not right:
+        return ""
+    errors = [relative_error(r.truth, r.drawn, r.known) for r in right]
+    within = [[q["low"] <= r.drawn[k] <= q["high"] for k, q in r.known.items()] for r in right]
+    error, held = median(np.array([e for e in errors if e is not None])), share_in_groups(within)
+    return (f"\nparameters: median error {error['value']:.1%} [{error['low']:.1%}, {error['high']:.1%}] in "
+            f"{error['n']} flights; in their 90 % interval {held['hits']} of {held['n']} [{held['low']:.0%}, "
+            f"{held['high']:.0%}]")
 
 
 def main() -> None:

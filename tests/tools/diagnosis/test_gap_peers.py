@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import binomtest
 
 from airtouch.errors import AirTouchError
+from airtouch.gap.signatures.signature import SIGNATURES
 from tools.diagnosis import gap_peers
 from tools.diagnosis.recordings import peers
 
@@ -45,6 +46,32 @@ def test_the_gap_closed_counts_where_the_first_answer_is_right():
     assert last == "gap closed with the right effect: median 0.90, >= 0.80 in 2 of 3; with a wrong one at most 0.10"
     assert "median 0.80," in gap_peers.summary([result(["mass"], 0.9), result(["mass"], 0.7)])
     assert len(gap_peers.summary(results[3:]).splitlines()) == 1
+
+
+def test_strengths_are_parameters_in_the_registry_s_units():
+    def row(effect, strength, detail="{}"):
+        return {"effect": effect, "strength": strength, "detail": detail}
+
+    assert peers.true_parameters(row("act_delay", "8.3")) == pytest.approx({"delay": 0.0083})
+    com = '{"com_m": [0.001, -0.002, 0.0]}'
+    assert peers.true_parameters(row("com_offset", "1.2", com)) == {"x": 0.001, "y": -0.002}
+    bias = peers.true_parameters(row("imu_bias", "1", '{"acc_bias": [1, 2, 3], "gyro_bias": [4, 5, 6]}'))
+    assert bias == {"acc_x": 1, "acc_y": 2, "acc_z": 3, "gyro_x": 4, "gyro_y": 5, "gyro_z": 6}
+    assert peers.true_parameters(row("wind", "0.5", '{"wind_mps": [0.5, 0.0, 0.0]}')) == {}
+    assert peers.true_parameters({"effect": "mass", "strength": "0.1"}) == {"fraction": 0.1}
+    for name, (parameter, _) in peers.STRENGTHS.items():
+        assert parameter in SIGNATURES[name].free
+
+
+def test_parameters_of_right_answers_are_scored():
+    """Errors of 10, 50 and 0 %; the last is a wrong name, which does not count."""
+    def known(value, low, high):
+        return {"drawn": {"fraction": 0.2}, "known": {"fraction": {"value": value, "low": low, "high": high}}}
+
+    results = [replace(result(["mass"]), **known(0.22, 0.19, 0.25)), replace(result(["mass"]), **known(0.1, 0.0, 0.19)),
+               replace(result(["gust"]), **known(0.2, 0.1, 0.3)), result(["mass"])]
+    line = gap_peers.summary(results).splitlines()[1]
+    assert line.startswith("parameters: median error 30.0% [10.0%, 50.0%] in 2 flights; in their 90 % interval 1 of 2")
 
 
 def test_a_run_goes_on_where_the_last_one_stopped(tmp_path, monkeypatch, capsys):

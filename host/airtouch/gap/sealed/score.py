@@ -242,7 +242,8 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
         if named is None:
             continue
         known = {k: q for k, q in named["parameters"].items() if "low" in q and k in e.values}
-        within, error = [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()], _relative_error(e, known)
+        within = [q["low"] <= e.values[k] <= q["high"] for k, q in known.items()]
+        error = relative_error(e.name, e.values, known)
         if error is not None:
             errors[e.kind].append(error)
             held[e.kind].append(within)
@@ -259,17 +260,19 @@ def parameters(sheet: Sheet) -> dict[str, Any]:
                           for k, v in sorted(errors.items())}}
 
 
-def _relative_error(effect: DrawnEffect, known: Mapping[str, Mapping[str, float]]) -> float | None:
-    """Distance of answered parameters from the drawn ones over their distance from neutral, in natural steps.
+def relative_error(effect: str, values: Mapping[str, float], known: Mapping[str, Mapping[str, float]],
+                   ) -> float | None:
+    """Distance of answered parameters of an effect from the drawn ones over theirs from neutral, in natural steps.
 
-    known: the answered ones, as JSON. Those without a neutral value, such as the charge of a battery or the length of a
-    rope, do not count: a wrong strength would vanish beside them. None where none that counts was drawn off neutral.
+    values: the drawn ones; known: the answered ones, as JSON. Those without a neutral value, such as the charge of a
+    battery or the length of a rope, do not count: a wrong strength would vanish beside them. None where none that
+    counts was drawn off neutral.
     """
-    counted = [p for p in get(effect.name).parameters if p.name in known and p.neutral is not None]
-    size = np.sqrt(sum(((effect.values[p.name] - neutral_of(p)) / unit(p)) ** 2 for p in counted))
+    counted = [p for p in get(effect).parameters if p.name in known and p.neutral is not None]
+    size = np.sqrt(sum(((values[p.name] - neutral_of(p)) / unit(p)) ** 2 for p in counted))
     if size == 0.0:
         return None
-    off = np.sqrt(sum(((known[p.name]["value"] - effect.values[p.name]) / unit(p)) ** 2 for p in counted))
+    off = np.sqrt(sum(((known[p.name]["value"] - values[p.name]) / unit(p)) ** 2 for p in counted))
     return float(off / size)
 
 
