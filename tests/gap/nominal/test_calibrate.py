@@ -9,6 +9,7 @@ from airtouch import vehicle as vehicles
 from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.calibrate import calibrated
+from airtouch.gap.signatures.scatter_estimates import scatter_of
 from airtouch.simulation.effects import EFFECTS
 from gap_flights import VEHICLE, fly, without_fits
 
@@ -48,6 +49,22 @@ def recorded(flight):
 def test_nominal_simulated_flights_all_count(of_nominal):
     study, calibration = of_nominal
     assert study.simulated and not calibration.notes
+
+
+def test_scatter_is_measured_when_it_is_asked_for_and_once(nominal, monkeypatch):
+    """Of simulated flights; of recorded ones it is measured before, as it tells whether they are simulated."""
+    measured = []
+    monkeypatch.setattr(calibrate, "kept_scatter", lambda *_: measured.append("once") or scatter_of(()))
+    study, _ = calibrated(VEHICLE, nominal)
+    assert study.simulated and study.relations is not None and not measured
+    assert study.scatter is replace(study, overhead=(("a", 0.0, 1.0),)).scatter and measured == ["once"]
+    study, _ = calibrated(VEHICLE, [recorded(f) for f in nominal])
+    assert not study.simulated and len(measured) == 2
+
+
+def test_a_single_baseline_flight_counts_as_recorded(nominal, without_fits):
+    study, _ = calibrated(VEHICLE, nominal[:1])
+    assert not study.simulated and study.relations is None
 
 
 def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, of_nominal, without_fits):

@@ -121,8 +121,11 @@ def _with_scatter(study: Study, vehicle: Vehicle, flights: Sequence[Flight], wit
 
 
 def _library(vehicle: Vehicle, flights: Sequence[Flight]) -> Library | None:
-    """The library of relations that holds for flights of a vehicle; None where none does, as for recorded ones."""
-    if any(is_recorded(f) for f in flights) or not of_one_trim(vehicle, flights):
+    """The library of relations that holds for flights of a vehicle.
+
+    None where none does: for recorded flights, those that differ in trim, and a single one, which does not show it.
+    """
+    if len(flights) < 2 or any(is_recorded(f) for f in flights) or not of_one_trim(vehicle, flights):
         return None
     return library_for(vehicle, [features(f, vehicle) for f in flights])
 

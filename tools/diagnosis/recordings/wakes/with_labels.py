@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from airtouch import vehicle as vehicles
+from airtouch.detector.evaluation.data.folds import BUILD_DAYS
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing.bursts import piece_powers
@@ -56,20 +57,26 @@ def detected(scores: np.ndarray, wake: np.ndarray) -> np.ndarray:
     return wake & (scores > calm[len(calm) - 1 - int(FALSE_ALARMS * len(calm))])
 
 
-def show_with_labels(flights: Path) -> None:
-    """Print a line for each learner and each kind of fold: AUROC, wakes detected, and those that are not."""
+def show_with_labels(flights: Path, part: str) -> None:
+    """Print a line for each learner and each kind of fold: AUROC, wakes detected, and those that are not.
+
+    part: as of `wakes_and_nominal`; of "all" the limit is that of all nominal flights, and day 21 is counted apart too.
+    """
     scikit("ensemble")  # before the flights are read
     rows = [(Path(case.flight).name, vehicles.load(case.vehicle).name, case.truth == "downwash", numbers_of(data))
-            for case, data in wakes_and_nominal(flights)]
+            for case, data in wakes_and_nominal(flights, part)]
     files, vehicle, wake = (np.array([row[k] for row in rows]) for k in range(3))
     numbers = relative_numbers(np.array([row[3] for row in rows]), vehicle, wake)
     drones = {r["file"]: f"{r['cf']} {r['day']}" for r in swarm_cuts.cuts(flights / "neuralswarm")}
     folds = {"all other flights": np.arange(len(files)), "other drones and days": np.array([drones[f] for f in files])}
+    built_on = np.array([drones[f].rsplit(" ", 1)[1] in BUILD_DAYS for f in files])
     print(f"{len(files)} flights, {wake.sum()} wakes, {numbers.shape[1]} numbers\n"
-          "| learner | labels of | AUROC | wakes detected | not detected |\n|---|---|---|---|---|")
+          "| learner | labels of | AUROC | wakes detected | of days not built on | not detected |\n"
+          "|---|---|---|---|---|---|")
     for learner in LEARNERS:
         for labels, fold in folds.items():
             scores = held_out_scores(numbers, wake, fold, learner)
             hit = detected(scores, wake)
             print(f"| {learner} | {labels} | {auroc(scores[wake].tolist(), scores[~wake].tolist()):.2f} | "
-                  f"{share_text(int(hit.sum()), int(wake.sum()))} | {' '.join(files[wake & ~hit])} |", flush=True)
+                  f"{share_text(int(hit.sum()), int(wake.sum()))} | {(hit & ~built_on).sum()} of "
+                  f"{(wake & ~built_on).sum()} | {' '.join(files[wake & ~hit])} |", flush=True)

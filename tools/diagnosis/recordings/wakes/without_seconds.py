@@ -25,11 +25,14 @@ from .. import cases
 DRAWS = 2000  #: bootstrap samples of flights, for an interval; no source: round number
 
 
-def wakes_and_nominal(flights: Path) -> Iterator[tuple[cases.Case, Data]]:
-    """The wakes and the nominal flights of days 19 and 20 with their data, each against the baseline of its group."""
+def wakes_and_nominal(flights: Path, part: str = "build") -> Iterator[tuple[cases.Case, Data]]:
+    """The wakes and the nominal flights of a part with their data, each against the baseline of its group.
+
+    part: "build", days 19 and 20, or "all".
+    """
     studies: dict[tuple[str, ...], Study] = {}
-    nominal = [c for c in cases.nominal(flights, "build") if "neuralswarm" in Path(c.flight).parts]
-    for case in [*cases.swarm(flights, "build"), *nominal]:
+    nominal = [c for c in cases.nominal(flights, part) if "neuralswarm" in Path(c.flight).parts]
+    for case in [*cases.swarm(flights, part), *nominal]:
         if case.truth == "ground_effect":
             continue
         vehicle = vehicles.load(case.vehicle)
