@@ -65,7 +65,7 @@ def main() -> None:
     fan, calm = (list(ready_flights([read(Path(p)) for p in group], vehicle, []))
                  for group in questions(folder)["wind"])
     print(f"calibrating on {len(calm)} calm flights", file=sys.stderr, flush=True)
-    study, _ = calibrate.calibrated(vehicle, calm)
+    study, _ = calibrate.calibrated(vehicle, calm, scatter=False)
     print("| flight | roll, yaw torque of the commands, rad/s^2 | far blocks | from, s | highest power over floor |")
     print("|---|---|---|---|---|")
     for flight in sorted((*calm, *fan), key=lambda one: Path(one.name).name):

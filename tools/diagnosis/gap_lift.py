@@ -151,6 +151,7 @@ def first_pass(log: FlightLog, vehicle: vehicles.Vehicle) -> Pass | None:
 def _print_passes(folder: Path) -> None:
     """The lift of the authors' low passes, by the down range."""
     vehicle, curve = vehicles.load(vehicles.DEFAULT_VEHICLE), CURVE["ns-34g"]
+    falling = curve[:int(np.argmax(np.diff(curve, append=np.inf) >= 0.0)) + 1]  # a lift belongs to one height there
     low, _ = readable_flights([f for f in collect([folder]) if in_still_air(f)
                                and f.condition.fold in BUILD_FOLDS and f.condition.height == "low"])
     whole = [p for p in (first_pass(log, vehicle) for log in low.values()) if p is not None]
@@ -168,7 +169,7 @@ def _print_passes(folder: Path) -> None:
         lifts = [p.lift for p in group]
         height, lift = np.mean([p.above_standing_m for p in group]), np.mean(lifts)
         error = np.std(lifts, ddof=1) / np.sqrt(len(group)) if len(group) > 1 else np.nan
-        same_lift = np.interp(-lift, -curve, CURVE_M)
+        same_lift = np.interp(-lift, -falling, CURVE_M[:len(falling)])
         print(f"| {100 * least:.1f} to {100 * most:.1f} cm, {100 * height:.1f} in the mean | {len(group)} | "
               f"{100 * lift:.1f} +- {100 * error:.1f} | {100 * np.interp(height, CURVE_M, curve):.1f} | "
               f"{100 * (same_lift - height):.1f} cm |")

@@ -1,6 +1,6 @@
 """Prints diagnoses of flights made with other people's simulators, each alone: first answers, gap closed, parameters.
 
-    python tools/diagnosis/gap_peers.py [FLIGHTS/peers] [--keep x.jsonl]    # 8 to 28 s of one core a flight
+    python tools/diagnosis/gap_peers.py [FLIGHTS/peers] [--keep x.jsonl]    # 3 to 10 s of one core a flight
 
 Each flight is held against the two `cal` flights of its vehicle; the diagnosis never sees the label.
 Names of one thing (`alike.ALIKE`) count as one. Parameters are scored where the effect has the label's name and the
@@ -23,6 +23,7 @@ from airtouch.cli.shared.flights import check_data_set
 from airtouch.cli.shared.progress import with_bar
 from airtouch.errors import in_one_line
 from airtouch.gap.diagnosis import diagnose
+from airtouch.gap.result import NamedEffect
 from airtouch.gap.sealed.intervals import median, share_in_groups, share_text
 from airtouch.gap.sealed.score import relative_error
 from airtouch.gap.signatures.alike import interchangeable
@@ -74,7 +75,7 @@ def diagnose_flight(folder: Path, label: peers.Row) -> PeerResult:
     diagnosis = diagnose([read(folder / label["file"])], vehicles.load(peers.vehicle_file(folder, label)),
                          [read(path) for path in peers.baseline(folder, label)])
     drawn, true_name = peers.true_parameters(label), peers.truth(label)
-    parameters = next((e.parameters for e in diagnosis.effects if e.name == true_name), {})
+    parameters = next((e.parameters for e in diagnosis.effects if e.name == true_name and is_same_rotor(e, drawn)), {})
     known = {k: {"value": q.value, "low": q.low, "high": q.high} for k, q in parameters.items()
              if k in drawn and q.low is not None and q.high is not None}
     named = "; ".join(f"{e.name} " + ", ".join(f"{k} {q.value:.3g}" for k, q in e.parameters.items()
@@ -87,8 +88,13 @@ def diagnose_flight(folder: Path, label: peers.Row) -> PeerResult:
         drawn, known)
 
 
+def is_same_rotor(effect: NamedEffect, drawn: Mapping[str, float]) -> bool:
+    """Whether an effect that is named is of the rotor that was drawn, if the manifest has one."""
+    return "rotor" not in drawn or effect.parameters["rotor"].value == drawn["rotor"]
+
+
 def summary(results: Sequence[PeerResult]) -> str:
-    """Lines with the counts of right answers, and with the gap closed where the first answer is right."""
+    """Lines with the counts of right answers, and with parameters and gap closed where the first answer is right."""
     first, three = (sum(r.within(n) for r in results) for n in (1, 3))
     n = len(results)
     text = f"first answer {share_text(first, n)}; first three {share_text(three, n)} (95 % intervals)"

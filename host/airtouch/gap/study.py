@@ -56,7 +56,7 @@ class Study:
     - nameless_floor: scatter of nominal flights in the nameless model (`nameless.columns.NamelessFloor`). None: that
       model takes them to have no scatter.
     - simulated: whether its nominal flights are those of a simulator, which are all drawn alike. Flights of a study
-      without nominal flights, or with a single one, count as recorded.
+      without nominal flights, with a single one, or where nobody asks, as for a map, count as recorded.
     - on_demand: how strong effects seem to be in nominal flights, to be read by `scatter`. None: nobody measures it, as
       for a map.
     - relations: what was learned of such flights (`relations.library.Library`). None: recorded flights, or no library

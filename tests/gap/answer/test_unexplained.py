@@ -10,11 +10,10 @@ from airtouch.gap.answer.unexplained import ratios_of_blocks, unexplained, worst
 from airtouch.gap.evidence.data import Data
 from airtouch.gap.naming.passing_effect import unsteadiness_rarity
 from airtouch.gap.naming.records import UnsteadinessRarity
-from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.result import REST_OF_FLIGHT
 from airtouch.gap.signals.channels import COLUMN, COUNT
 from airtouch.gap.signals.spectra import AIR, LENGTH, starts
-from airtouch.gap.signatures.scatter import Scatter
+from airtouch.gap.signatures.scatter import UNSTEADY_LIFT, UNSTEADY_TORQUE, Scatter
 from airtouch.logs.segments import KINDS
 from gap_flights import flight, noise
 from made_diagnosis import cell

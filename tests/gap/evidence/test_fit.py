@@ -49,6 +49,18 @@ def test_a_turn_whose_offsets_are_far_from_their_prior_is_not_the_highest(monkey
     assert result.terms[1].values == pytest.approx(strengths[0].values)
 
 
+def test_a_gain_beside_noise_is_fitted_where_the_judged_likelihood_is_highest(study):
+    """The loop answers the noise too: what it commands for that is not the gain's."""
+    data = Data(study, fly(1, 7, {"imu_noise": {"factor": 2.0}, "controller_gain": {"rate": 0.7}}))
+    (gain,) = (t for t in candidates.terms("controller_gain") if t.free == ("rate",))
+    blocks = whole_of(data)
+    fitted, noise = fit(data, blocks, (gain, *candidates.terms("imu_noise"))).terms
+    rates = [fitted.values["rate"] + by for by in (-0.04, 0.0, 0.04)]
+    lower, there, higher = (judge(data, blocks, (replace(fitted, values={**fitted.values, "rate": rate}), noise))
+                            for rate in rates)
+    assert there > lower and there > higher
+
+
 @pytest.mark.parametrize("start", [0.05, 3.0])
 def test_mean_and_random_part_do_not_depend_on_where_the_fit_begins(study, start):
     truth = {"strength": 1.0, "turbulence": 0.3}

@@ -15,6 +15,7 @@ from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.relations.effect_class import EffectClass
 from airtouch.gap.relations.inference import Inference
 from airtouch.gap.signatures.candidates import all_candidates
+from airtouch.gap.study import ScatterOnDemand
 from hovers import DOWN, FLOOR, candidates_of, hover, scattered, with_a_push
 
 EXPLAINED, OPEN = Counterevidence(1.0, 30.0, of_distance=False), Counterevidence(90.0, 30.0, of_distance=False)
@@ -55,6 +56,19 @@ def test_selection_has_a_step_for_each_effect_with_its_evidence():
                                                                         ("mass", True, 20.0)]
     assert {t.name for t in selection.last_step.terms} == {"mass", "imu_noise"}
     assert selection.inference is inferred and is_explained(selection)
+
+
+def test_where_the_relations_explain_no_scatter_is_asked_for(monkeypatch):
+    """Its measuring takes seconds; the answer and the other candidates do without."""
+    def never():
+        raise AssertionError("the scatter was measured")
+
+    study = replace(FLOOR, simulated=True, nominal_count=2, on_demand=ScatterOnDemand(never))
+    monkeypatch.setattr(select, "inference_of", lambda *_: inference([effect_class("mass")]))
+    monkeypatch.setattr(select, "PACKAGE_EFFECTS", frozenset(("mass", "imu_noise")))
+    data = Data(study, [hover(1, (0.0, 0.0, -DOWN))])
+    selection = select.select(data, candidates_of(["mass", "imu_noise"]))
+    assert [s.name for s in selection.named_steps] == ["mass"] and selection.single_effects["imu_noise"].evidence == 0.0
 
 
 @pytest.fixture

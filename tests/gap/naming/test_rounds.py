@@ -111,6 +111,13 @@ def test_unpromising_random_effect_is_not_fitted(louder, full):
     assert best.full is full and bool(best.gain > HOPELESS) is full
 
 
+def test_a_promising_effect_of_the_loop_is_fitted_in_full(flying):
+    on = judging.trial_of(Data(flying, fly(1, 62)))
+    late = candidates_of(["sensor_latency"])
+    assert not round_of(on, late, None)["sensor_latency"].full, "a nominal flight"
+    assert round_of(on, late, None, promising=("sensor_latency",))["sensor_latency"].full
+
+
 def test_every_strength_has_each_parameter_alone(flying):
     data = Data(flying, fly(1, 62))
     on = judging.trial_of(data)

@@ -29,9 +29,7 @@ def _without_fits(monkeypatch):
 @pytest.fixture(scope="module")
 def of_nominal(nominal):
     """The study of nominal flights, and the calibration."""
-    with pytest.MonkeyPatch.context() as patch:
-        without_fits(patch)
-        return calibrated(VEHICLE, nominal)
+    return calibrated(VEHICLE, nominal)
 
 
 def with_a_push(flight, metres_per_second2):
@@ -58,6 +56,7 @@ def test_scatter_is_measured_when_it_is_asked_for_and_once(nominal, monkeypatch)
     study, _ = calibrated(VEHICLE, nominal)
     assert study.simulated and study.relations is not None and not measured
     assert study.scatter is replace(study, overhead=(("a", 0.0, 1.0),)).scatter and measured == ["once"]
+    assert study.with_scatter(study.scatter).simulated, "whichever class of the table fits best"
     study, _ = calibrated(VEHICLE, [recorded(f) for f in nominal])
     assert not study.simulated and len(measured) == 2
 
@@ -65,6 +64,12 @@ def test_scatter_is_measured_when_it_is_asked_for_and_once(nominal, monkeypatch)
 def test_a_single_baseline_flight_counts_as_recorded(nominal, without_fits):
     study, _ = calibrated(VEHICLE, nominal[:1])
     assert not study.simulated and study.relations is None
+
+
+def test_flights_for_which_no_library_holds_may_be_simulated_too(nominal, without_fits):
+    """The library knows no such vehicle: what nominal flights show of effects tells, and is measured at once."""
+    study, _ = calibrated(replace(VEHICLE, acc_noise_rms_mps2=1.01 * VEHICLE.acc_noise_rms_mps2), nominal)
+    assert study.simulated and study.relations is None
 
 
 def test_a_simulated_flight_that_lands_on_an_edge_is_left_out(nominal, of_nominal, without_fits):

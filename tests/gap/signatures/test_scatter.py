@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
 from airtouch.gap.nominal.apparent import NOBODY_KNOWS
-from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT
 from airtouch.gap.signatures.alike import ALIKE
-from airtouch.gap.signatures.posterior import LEAST, standard_deviation
-from airtouch.gap.signatures.scatter import FALSE_SHARE, ApparentStrengths, Scatter, size_of, table
+from airtouch.gap.signatures.posterior import LEAST, predicted, standard_deviation
+from airtouch.gap.signatures.scatter import FALSE_SHARE, UNSTEADY_LIFT, ApparentStrengths, Scatter, size_of, table
 from airtouch.gap.signatures.scatter_estimates import LEAST_RECORDED, class_scatter, scatter_of, student_log_density
 from airtouch.simulation.effects import EFFECTS
 
@@ -196,6 +195,41 @@ def test_a_passing_effect_of_a_nominal_flight_is_no_news_in_the_next():
         scatter = class_scatter([ApparentStrengths({}, {}, 0.0, {"gust": size()}) for _ in range(40)])
         beyond += [scatter.unusual({"gust": size()}) > 0.0 for _ in range(40)]
     assert np.mean(beyond) < 0.06
+
+
+def test_steady_baseline_flights_make_an_unsteady_flight_news():
+    """A vehicle has its own level of unsteadiness, above or below that of its class, but of gusts no flight is free."""
+    own = table()["motion capture, uSD log, ns-34g"]
+    strengths = {n: 0.0 * x for n, x in own.rms.items()}
+
+    def passing_of(level):
+        flights = [ApparentStrengths(strengths, strengths, 0.0, {"gust": 0.0, UNSTEADY_LIFT: level + by})
+                   for by in (-0.1, 0.1)]
+        return scatter_of(flights, recorded=True, vehicle="ns-34g").passing
+
+    mean, spread = own.passing[UNSTEADY_LIFT]
+    (low, of_low), (high, of_high) = (passing_of(mean + by)[UNSTEADY_LIFT] for by in (-0.5, 0.5))
+    assert low == pytest.approx(mean - 0.25) and high == pytest.approx(mean + 0.25), "the class counts as two flights"
+    assert of_low == pytest.approx(of_high) and passing_of(mean)[UNSTEADY_LIFT][1] < of_low
+    assert passing_of(mean)["gust"][0] >= own.passing["gust"][0]
+
+
+@pytest.mark.parametrize("values", [(), (0.4,), (-1.0, -0.8, -1.1)])
+def test_a_further_value_is_foretold_as_the_integral_over_level_and_variance_does(values):
+    """The integral of the normal density over a grid of levels and variances, weighted by prior and likelihood."""
+    mean, spread, level_worth, worth = 0.2, 0.5, 2.0, 4.0
+    about_level = spread ** 2 * level_worth / (level_worth + 1.0)
+    variance = np.geomspace(1e-3, 50.0, 700)[:, None]
+    level = np.linspace(-8.0, 8.0, 1601)[None, :]
+    log_weight = (-0.5 * worth * (np.log(variance) + about_level / variance)  # per logarithm of the variance
+                  - 0.5 * np.log(variance) - 0.5 * level_worth * (level - mean) ** 2 / variance)
+    for x in values:
+        log_weight = log_weight - 0.5 * np.log(variance) - 0.5 * (x - level) ** 2 / variance
+    weight = np.exp(log_weight - log_weight.max())
+    middle, scale = predicted((mean, spread), values, level_worth, worth)
+    for x in (middle - scale, middle, middle + 3.0 * scale):
+        below = float((weight * norm.cdf((x - level) / np.sqrt(variance))).sum() / weight.sum())
+        assert student.cdf((x - middle) / scale, worth + len(values)) == pytest.approx(below, abs=2e-3)
 
 
 def test_a_wind_is_no_news_where_nominal_flights_have_gusts():

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import binomtest
 
 from airtouch.errors import AirTouchError
+from airtouch.gap.result import NamedEffect, Quantity
 from airtouch.gap.signatures.signature import SIGNATURES
 from tools.diagnosis import gap_peers
 from tools.diagnosis.recordings import peers
@@ -59,6 +60,11 @@ def test_strengths_are_parameters_in_the_registry_s_units():
     assert bias == {"acc_x": 1, "acc_y": 2, "acc_z": 3, "gyro_x": 4, "gyro_y": 5, "gyro_z": 6}
     assert peers.true_parameters(row("wind", "0.5", '{"wind_mps": [0.5, 0.0, 0.0]}')) == {}
     assert peers.true_parameters({"effect": "mass", "strength": "0.1"}) == {"fraction": 0.1}
+    weak = peers.true_parameters(row("weak_motor", "0.1", '{"motor": "m2"}'))
+    assert weak == {"thrust_loss": 0.1, "rotor": 2.0}
+    named = [NamedEffect("weak_motor", {"rotor": Quantity(n), "thrust_loss": Quantity(0.1)}) for n in (2.0, 3.0)]
+    assert [gap_peers.is_same_rotor(effect, weak) for effect in named] == [True, False]
+    assert gap_peers.is_same_rotor(named[1], {"thrust_loss": 0.1}), "where the manifest has no rotor"
     for name, (parameter, _) in peers.STRENGTHS.items():
         assert parameter in SIGNATURES[name].free
 

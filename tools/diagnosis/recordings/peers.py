@@ -4,7 +4,7 @@ import csv
 import json
 from pathlib import Path
 
-Row = dict[str, str]  #: of the manifest: file, vehicle, effect, strength, unit
+Row = dict[str, str]  #: of the manifest: file, vehicle, effect, strength, unit and, where it is there, detail
 #: the manifest's name of an effect -> the registry's, where they differ
 NAMES = {"latency": "sensor_latency", "act_delay": "actuator_delay", "thrust_coeff": "thrust_coefficient"}
 #: effect, by the registry's name -> the parameter of the registry that a manifest's strength is, and its unit there.
@@ -46,5 +46,7 @@ def true_parameters(row: Row) -> dict[str, float]:
         name, unit = STRENGTHS[truth(row)]
         out[name] = unit * float(row["strength"])
     for key, values in json.loads(row.get("detail") or "{}").items():
+        if key == "motor":
+            out["rotor"] = float(values.removeprefix("m"))
         out |= dict(zip(DIRECTIONS.get(key, ()), values, strict=False))  # a z of 0 beside x and y is no parameter
     return out

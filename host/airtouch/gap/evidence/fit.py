@@ -19,6 +19,7 @@ from airtouch.gap.evidence.slopes import active_at
 from airtouch.gap.signatures.candidates import mean_of, random_of
 from airtouch.gap.signatures.signature import MEAN, SPECTRUM
 from airtouch.gap.signatures.term import Term, Terms, mean_slices
+from airtouch.simulation.effects import Active
 
 #: turns, at most, of fitting mean, then random effects; chosen for time. A smaller number ends more fits before the
 #: peak
@@ -70,20 +71,21 @@ def fit(data: Data, blocks: BlockSet, terms: Sequence[Term], start: np.ndarray |
     mean, random = mean_of(terms), random_of(terms)
     x = start_of(problem, mean, start)
     random_power: np.ndarray | float = 0.0
+    beside: list[Active] = []  # the random effects as fitted so far
     # at an unknown start random effects would take up what the mean ones explain: there they follow the first mean fit
     if random and mean and start is not None:
         random = fit_strengths(problem, random, problem.residual(active_at(mean, x)), active_at(mean, x))
-        random_power = problem.random_power(random)
+        random_power, beside = problem.random_power(random), [t.active() for t in random]
     best, highest, offsets = None, -np.inf, None
     for _ in range(1 if brief else MOST_TURNS):
-        posterior = Posterior(problem, mean, random_power, prior_std, uncertain_floor=bool(random))
+        posterior = Posterior(problem, mean, random_power, prior_std, bool(random), beside)
         solution = gauss_newton(posterior, x, BRIEF_STEPS if brief else MOST_STEPS, offsets)
         x, offsets, active = solution.x, solution.offsets, active_at(mean, solution.x)
         if not random:
             return FittedTerms(_with_values(terms, x, random), x, solution.covariance)
-        random = fit_strengths(problem, random, solution.residual, active)
-        random_power = problem.random_power(random)
-        reached = Posterior(problem, mean, random_power, prior_std, uncertain_floor=True)
+        random = fit_strengths(problem, random, solution.residual, [*active, *beside])
+        random_power, beside = problem.random_power(random), [t.active() for t in random]
+        reached = Posterior(problem, mean, random_power, prior_std, True, beside)
         level = -reached.at(x, solution.offsets).cost
         settled = not mean or level < highest + LEAST_TURN_GAIN
         if best is None or level > highest:

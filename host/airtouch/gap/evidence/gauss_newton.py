@@ -14,6 +14,7 @@ from airtouch.gap.evidence.least_squares import Bounds, bounded_step, bounds_of,
 from airtouch.gap.evidence.problem import Problem
 from airtouch.gap.evidence.slopes import SpectraSlopes, active_at, slopes_at
 from airtouch.gap.signatures.term import Term, mean_slices
+from airtouch.simulation.effects import Active
 
 MOST_STEPS = 8  #: steps at most; chosen for time. A smaller number ends more fits before they stand still
 #: nats that a step must gain for the fit to go on; chosen for time. A larger number ends fits too early
@@ -61,14 +62,14 @@ class _Point(NamedTuple):
 class Posterior:
     """Posterior of mean effects' parameters beside random effects that stay as they are.
 
-    random_power (n,): extra power of the random effects; prior_std: standard deviation of the parameters' prior, (k,)
-    or one for all; uncertain_floor: whether the commands' floor is as uncertain as under random effects. The attribute
-    `prior_stds` (k + m,) is that of parameters and offsets.
+    random_power (n,): extra power of the random effects; random: these, as far as the loop answers them too; prior_std:
+    standard deviation of the parameters' prior, (k,) or one for all; uncertain_floor: whether the commands' floor is as
+    uncertain as under random effects. The attribute `prior_stds` (k + m,) is that of parameters and offsets.
     """
 
     def __init__(self, problem: Problem, mean: Sequence[Term], random_power: np.ndarray | float,
-                 prior_std: np.ndarray | float, uncertain_floor: bool) -> None:
-        self.problem, self.mean = problem, mean
+                 prior_std: np.ndarray | float, uncertain_floor: bool, random: Sequence[Active] = ()) -> None:
+        self.problem, self.mean, self.random = problem, mean, random
         self.random_power, self.uncertain_floor = random_power, uncertain_floor
         of_loop = np.array([t.signature.loop_only for t in mean for _ in t.free], bool)
         of_parameters = np.where(of_loop, np.minimum(prior_std, COMMAND_PRIOR_STD), prior_std)
@@ -80,7 +81,7 @@ class Posterior:
         residual = self.problem.residual(active) if self.mean else self.problem.elements.residual.copy()
         for amount, (indices, column, _) in zip(offsets, self.problem.offsets, strict=True):
             residual[indices] -= amount * column
-        of_loop = self.problem.loop_change(active, self.uncertain_floor)
+        of_loop = self.problem.loop_change([*active, *self.random], self.uncertain_floor)
         extra = self.random_power + of_loop.extra_power
         away = float(((np.concatenate([x, offsets]) / self.prior_stds) ** 2).sum())
         cost = of_loop.cost + (0.5 * away - self.problem.likelihood(residual, extra))
@@ -115,7 +116,7 @@ def gauss_newton(posterior: Posterior, x: np.ndarray, most: int = MOST_STEPS,
     slopes: SpectraSlopes | None = None
     stuck, damping = False, 0.0
     for _ in range(most):
-        slopes = slopes_at(problem, mean, now.x) if slopes is None else slopes.moved_to(now.x, stuck)
+        slopes = slopes.moved_to(now.x, stuck) if slopes else slopes_at(problem, mean, now.x, posterior.random)
         before = now.cost
         now, covariance, damping, gained = _step(posterior, slopes, now, bounds, damping)
         gained_too_little = gained and before - now.cost < LEAST_STEP_GAIN

@@ -28,16 +28,16 @@ LEAST_CURVATURE = 1e-6
 CURVATURE_STEP = 0.15
 
 
-def fit_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, mean: Sequence[Active],
+def fit_strengths(problem: Problem, random: Sequence[Term], residual: np.ndarray, of_loop: Sequence[Active],
                   ) -> list[Term]:
     """Random effects with their likeliest strengths, fitted one after another, the others as they are.
 
-    residual (n,): under the mean effects `mean`.
+    residual (n,): under the mean effects; of_loop: these, and random ones as they are, whose noise the loop answers.
     """
-    fitted, of_loop = list(random), problem.loop_change(mean, uncertain_floor=True).extra_power
+    fitted, from_loop = list(random), problem.loop_change(of_loop, uncertain_floor=True).extra_power
     for _ in range(STRENGTH_ROUNDS if len(fitted) > 1 else 1):
         for i, term in enumerate(fitted):
-            others = of_loop + problem.random_power([*fitted[:i], *fitted[i + 1:]])
+            others = from_loop + problem.random_power([*fitted[:i], *fitted[i + 1:]])
             fitted[i] = fit_strength(problem, term, residual, others)
     return fitted
 

@@ -45,13 +45,14 @@ class SpectraSlopes:
     """First-order changes of the residual of `problem` by the k parameters of mean effects.
 
     at (k,): scaled parameters at which all slopes were last taken; nonlinear ones may be newer.
-    by_parameter: k of them.
+    by_parameter: k of them; random: random effects beside them, which stay as they are.
     """
 
     problem: Problem
     mean: Sequence[Term]
     at: np.ndarray
     by_parameter: Sequence[ParameterSlopes]
+    random: Sequence[Active] = ()
 
     def moved_to(self, x: np.ndarray, anew: bool = False) -> "SpectraSlopes":
         """The slopes for scaled parameters x (k,), where those of nonlinear parameters are taken anew.
@@ -59,9 +60,9 @@ class SpectraSlopes:
         All are where x is farther than LARGEST_MOVE from `at`, or if `anew`.
         """
         if anew or bool((np.abs(x - self.at) > LARGEST_MOVE * np.maximum(np.abs(x), 1.0)).any()):
-            return slopes_at(self.problem, self.mean, x)
+            return slopes_at(self.problem, self.mean, x, self.random)
         stale = [i for i, s in enumerate(self.by_parameter) if s.nonlinear]
-        newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale), strict=True))
+        newer = dict(zip(stale, _slopes_of(self.problem, self.mean, x, stale, self.random), strict=True))
         return replace(self, by_parameter=[newer.get(i, s) for i, s in enumerate(self.by_parameter)])
 
     def power_slopes(self, x: np.ndarray, residual: np.ndarray, extra_power: np.ndarray | float,
@@ -72,7 +73,7 @@ class SpectraSlopes:
         uncertain_floor: see `Problem.modelled`.
         """
         problem = self.problem
-        active, rises = active_at(self.mean, x), np.array([s.rise for s in self.by_parameter])
+        active, rises = [*active_at(self.mean, x), *self.random], np.array([s.rise for s in self.by_parameter])
         slopes = problem.flat.commands.slopes(active, rises, uncertain_floor)
         powers = np.array([s.extra_torque_power for s in self.by_parameter])
         if powers.any():
@@ -83,13 +84,14 @@ class SpectraSlopes:
         return slopes
 
 
-def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray) -> SpectraSlopes:
-    """The slopes by all parameters of mean effects at scaled ones x (k,)."""
-    return SpectraSlopes(problem, mean, x.copy(), _slopes_of(problem, mean, x, range(len(x))))
+def slopes_at(problem: Problem, mean: Sequence[Term], x: np.ndarray, random: Sequence[Active] = ()) -> SpectraSlopes:
+    """The slopes by all parameters of mean effects at scaled ones x (k,), beside random effects."""
+    return SpectraSlopes(problem, mean, x.copy(), _slopes_of(problem, mean, x, range(len(x)), random), random)
 
 
-def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int]) -> list[ParameterSlopes]:
-    """The slopes by some of the parameters at scaled parameters x (k,).
+def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Sequence[int],
+               random: Sequence[Active]) -> list[ParameterSlopes]:
+    """The slopes by some of the parameters at scaled parameters x (k,), beside random effects.
 
     They are differences over SLOPE_STEP, within the bounds. which: indices of the parameters.
     """
@@ -97,7 +99,7 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
         return []
     high = bounds_of(mean).high
     before = active_at(mean, x)
-    residual, extra_torque_power = problem.residual(before), problem.extra_torque_power(before)
+    residual, extra_torque_power = problem.residual(before), problem.extra_torque_power([*before, *random])
     out = []
     for i in which:
         step = SLOPE_STEP if x[i] + SLOPE_STEP <= high[i] else -SLOPE_STEP
@@ -105,6 +107,8 @@ def _slopes_of(problem: Problem, mean: Sequence[Term], x: np.ndarray, which: Seq
         shifted[i] += step
         after = active_at(mean, shifted)
         out.append(ParameterSlopes(
-            (problem.residual(after) - residual) / step, problem.flat.commands.rise(before, after) / step,
-            (problem.extra_torque_power(after) - extra_torque_power) / step, loops_differ(problem.data, before, after)))
+            (problem.residual(after) - residual) / step,
+            problem.flat.commands.rise([*before, *random], [*after, *random]) / step,
+            (problem.extra_torque_power([*after, *random]) - extra_torque_power) / step,
+            loops_differ(problem.data, before, after)))
     return out

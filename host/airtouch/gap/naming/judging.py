@@ -182,8 +182,8 @@ def strength_of(term: Term, fitted: Sequence[Term], fits: Sequence[FittedTerms])
     fitted: the terms of the hypothesis, with their values; fits: those of them that show in the spectra, to each half.
     """
     hypotheses = [fitted] if term.shows_in == CLOCK or not fits else [f.terms for f in fits]
-    sought = term.identity, term.shows_in
-    in_each = [next(t for t in terms if (t.identity, t.shows_in) == sought) for terms in hypotheses]
+    sought = term.slot, term.shows_in
+    in_each = [next(t for t in terms if (t.slot, t.shows_in) == sought) for terms in hypotheses]
     k = len(term.free)
     scaled = np.array([t.scaled(t.values)[:k] for t in in_each])
     mean = term.among_all(scaled.mean(axis=0))

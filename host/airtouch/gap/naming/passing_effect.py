@@ -12,8 +12,8 @@ from airtouch.gap.naming.policy import PASSING_GAIN
 from airtouch.gap.naming.records import Charges, Hypothesis, OutgainedPassing, Step, Strength, UnsteadinessRarity
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, PassingEffect, passing_effects
 from airtouch.gap.passing.one_sided import DOWNWARD, downward
-from airtouch.gap.passing.unsteadiness import UNSTEADY_TORQUE, log_entropies
-from airtouch.gap.signatures.scatter import Scatter, size_of
+from airtouch.gap.passing.unsteadiness import log_entropies
+from airtouch.gap.signatures.scatter import UNSTEADY_TORQUE, Scatter, size_of
 from airtouch.gap.signatures.signature import OVERHEAD
 
 

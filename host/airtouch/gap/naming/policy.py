@@ -196,11 +196,11 @@ def unknown_limit(study: Study, seconds: float) -> UnknownLimit:
 
     From two nominal flights on it falls with their number n, as the factor (n + 1) / (n - 1) does: 36 nats with two, 24
     with three. With one or none it is 25 nats, less than with two, but UNKNOWN_ASSUMED of what the nameless model gains
-    over no effect counts as well, and what it gains in nominal flights, though they are simulated.
+    over no effect counts as well, and what it gains in nominal flights.
     """
     n = study.nominal_count
     # of simulated flights it does not count, and is not asked for, as to measure their scatter takes seconds
-    scatter = None if n > 1 and study.simulated else study.scatter
+    scatter = None if study.simulated else study.scatter
     nominal_gain = 0.0 if scatter is None else scatter.allowed(seconds, UNKNOWN_GAIN)
     if n < 2:
         return UnknownLimit(UNKNOWN_ALONE, share_over_none=UNKNOWN_ASSUMED, nominal_gain=nominal_gain)

@@ -67,8 +67,8 @@ class Hypothesis:
     such term or was only screened; full: whether it was fitted to the end, not screened or fitted briefly.
 
     Of the newest effect alone: strength; evidence: nats that it gains over the base, but no more than its strength says
-    beyond the scatter of nominal flights; passing_key: of a passing effect, the entry of `Scatter.passing` that it is
-    compared with, else None.
+    beyond the scatter of nominal flights, 0 where the relations of signals decide and nobody asks; passing_key: of a
+    passing effect, the entry of `Scatter.passing` that it is compared with, else None.
     """
 
     name: str

@@ -37,7 +37,8 @@ def best_beside(trial: Trial, candidates: Mapping[str, Sequence[Terms]], base: H
     """
     start = start_of(trial, base)
     variants, not_fitted = _screen(start, candidates, progress, promising)
-    fitted = map_on_two_cores(partial(_fit_variant, start), _without_hopeless_parts(start, variants))
+    fitted = map_on_two_cores(partial(_fit_variant, start, promising),
+                              _without_hopeless_parts(start, variants, promising))
     return best_of_each(trial, [*fitted, *not_fitted], len(start.terms))
 
 
@@ -70,24 +71,26 @@ def _screen(start: RoundStart, candidates: Mapping[str, Sequence[Terms]],
     return [*screened.fit_only, *random, *means_to_fit], not_fitted
 
 
-def _without_hopeless_parts(start: RoundStart, variants: Sequence[PricedVariant]) -> list[PricedVariant]:
-    """The variants without those that free one parameter of an effect of the loop whose parameters gain nothing at all.
+def _without_hopeless_parts(start: RoundStart, variants: Sequence[PricedVariant], promising: Container[str],
+                            ) -> list[PricedVariant]:
+    """The variants without those of one parameter of an effect of the loop whose parameters together gain little.
 
-    What all of them together do not gain by a brief fit, none gains alone.
+    By a brief fit these gain PROMISING nats at most; promising: names of effects that are kept at any gain.
     """
-    hopeless = {v.name for v in variants if _is_tried_alone(v) and _of_loop_alone(v)
+    hopeless = {v.name for v in variants if _is_tried_alone(v) and _of_loop_alone(v) and v.name not in promising
                 and cross_validated(start.trial, v, start.base, brief=True).gain - start.gain <= PROMISING}
     return [v for v in variants if v.name not in hopeless or _is_tried_alone(v)]
 
 
-def _fit_variant(start: RoundStart, variant: PricedVariant) -> Hypothesis:
+def _fit_variant(start: RoundStart, promising: Container[str], variant: PricedVariant) -> Hypothesis:
     """A variant fitted beside the base of a round.
 
     An effect of the loop alone, of which each step of a fit works out loops anew, is fitted briefly first, and in full
-    where it may then gain what it must: BRIEF_SHARE of that, less PROMISING.
+    where it may then gain what it must: BRIEF_SHARE of that, less PROMISING. promising: names of effects that are
+    fitted in full at any gain.
     """
     fit = partial(cross_validated, start.trial, variant, start.base)
-    if not _of_loop_alone(variant):
+    if not _of_loop_alone(variant) or variant.name in promising:
         return fit()
     briefly = fit(brief=True)
     required = least_further_gain(start.trial, start.base, briefly) if start.base else FIRST_GAIN

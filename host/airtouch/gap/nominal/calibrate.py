@@ -10,7 +10,7 @@ The thrust of all rotors together is that of the mean (`mean_thrust` says why), 
 is fitted only where flights rest, which shows it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -31,6 +31,7 @@ from airtouch.gap.nominal.mean_thrust import BIAS_STD, SEEN_AT_REST, lift_note, 
 from airtouch.gap.relations.library import Library, library_for
 from airtouch.gap.result import Quantity
 from airtouch.gap.signatures.candidates import all_candidates, terms
+from airtouch.gap.signatures.scatter import Scatter
 from airtouch.gap.signatures.term import Term
 from airtouch.gap.study import ScatterOnDemand, Study
 from airtouch.simulation.effects import Active
@@ -88,8 +89,7 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
         left_out = [*left_out, *unlike, *far]
         measured = _measured(vehicle, alike, scatter, without)
     study, nominal = measured.study, measured.flights
-    if study.simulated:
-        study = _as_simulated(study, nominal, without)
+    study = _with_own_effects(study, without)
     notes = (*left_out, *lift_note(vehicle, nominal, measured.fitted.terms), *odd_flights(study, nominal))
     return study, Calibration(vehicle, study.calibration, _quantities(measured.fitted), notes, tuple(nominal))
 
@@ -115,9 +115,15 @@ def _with_scatter(study: Study, vehicle: Vehicle, flights: Sequence[Flight], wit
     Where a library of relations holds they are, and nothing is measured yet. vehicle: as declared.
     """
     measure = partial(kept_scatter, vehicle, flights, without, partial(baseline_scatter, study, flights, without))
-    if _library(vehicle, flights) is None:
+    library = _library(vehicle, flights)
+    if library is None:
         return study.with_scatter(measure())
-    return replace(study, simulated=True, on_demand=ScatterOnDemand(measure))
+    return replace(study, simulated=True, relations=library, on_demand=ScatterOnDemand(partial(_exact, measure)))
+
+
+def _exact(measure: Callable[[], Scatter]) -> Scatter:
+    """The scatter of flights for which a library of relations holds, so that they come from the models of effects."""
+    return replace(measure(), exact=True)
 
 
 def _library(vehicle: Vehicle, flights: Sequence[Flight]) -> Library | None:
@@ -145,18 +151,17 @@ def _fitted_vehicle(vehicle: Vehicle, flights: Sequence[Flight]) -> tuple[Study,
     return study_of(vehicle, calibration, flights), fitted
 
 
-def _as_simulated(study: Study, flights: Sequence[Flight], without: Sequence[str]) -> Study:
-    """The study of simulated flights: with the relations of their signals, where a library holds for them.
+def _with_own_effects(study: Study, without: Sequence[str]) -> Study:
+    """The study, its library of relations completed by what the user's own effects do.
 
-    without: effects that are no candidates; of the others the library learns those that it lacks.
+    without: effects that are no candidates.
     """
-    relations = _library(study.vehicle, flights)
     names = all_candidates(without)
-    if relations is not None and not relations.effects.issuperset(names):
-        from airtouch.gap.relations.own_effect import completed  # a second of imports, which few need
+    if study.relations is None or study.relations.effects.issuperset(names):
+        return study
+    from airtouch.gap.relations.own_effect import completed  # a second of imports, which few need
 
-        relations = completed(relations, study.vehicle, names)
-    return replace(study, relations=relations)
+    return replace(study, relations=completed(study.relations, study.vehicle, names))
 
 
 def _terms_and_priors(at_rest: bool) -> tuple[list[Term], np.ndarray]:

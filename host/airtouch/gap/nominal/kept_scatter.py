@@ -1,6 +1,6 @@
 """The scatter of a baseline, kept on disk from one diagnosis to the next.
 
-It takes most of the time of a short diagnosis, and depends on the baseline alone: who flies, diagnoses and flies again
+It takes up to two fifths of a diagnosis, and depends on the baseline alone: who flies, diagnoses and flies again
 need not wait for it twice.
 """
 

@@ -10,9 +10,9 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.flights.flight import Flight
 from airtouch.gap.passing.bursts import LEAST_PIECES, SHAKE_BAND_HZ, SHAKE_PIECE_S, piece_powers
 from airtouch.gap.signals.channels import FORCE, TORQUE
+from airtouch.gap.signatures.scatter import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.study import Study
 
-UNSTEADY_TORQUE, UNSTEADY_LIFT = "unsteady_torque", "unsteady_lift"  #: names of the two measures in `Scatter.passing`
 #: columns of the residual whose powers make each of the two
 COLUMNS = {UNSTEADY_TORQUE: tuple(range(TORQUE.start, TORQUE.stop)), UNSTEADY_LIFT: (FORCE.stop - 1,)}
 #: least entropy, without unit; chosen: noise that is equally strong all along has 0.02 to 0.06. A larger number makes

@@ -162,10 +162,8 @@ def severities_of(study: Study, seed: int, kinds: Sequence[str] | None = None, p
 
 
 def calibrated_study(vehicle: Vehicle, cal: Sequence[FlightLog]) -> Study:
-    """What flights of a set are held against, the scatter of the nominal ones measured before processes share it."""
-    study, _ = calibrate.calibrated(vehicle, list(ready_flights(cal, vehicle, [])))
-    assert study.scatter is not None
-    return study.with_scatter(study.scatter)
+    """What flights of a set are held against."""
+    return calibrate.calibrated(vehicle, list(ready_flights(cal, vehicle, [])))[0]
 
 
 def draw(count: int, severities: Severities, rng: np.random.Generator) -> list[list[Draw]]:

@@ -135,8 +135,10 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
 
 
 def study_in(folder: Path) -> Study:
-    """The study that a sealed set's own vehicle and nominal flights give."""
-    return make.calibrated_study(load(folder / "vehicle.toml"), [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))])
+    """The study of a sealed set's own vehicle and nominal flights; its scatter is measured before processes share it."""
+    cal = [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))]
+    study = make.calibrated_study(load(folder / "vehicle.toml"), cal)
+    return study if study.scatter is None else study.with_scatter(study.scatter)
 
 
 def _begin(study: Study | None) -> None:

@@ -48,6 +48,26 @@ def updated(own: tuple[float, float], values: Sequence[float] | np.ndarray, wort
     return mean, max(spread, least)
 
 
+def predicted(own: tuple[float, float], values: Sequence[float] | np.ndarray, level_worth: float, worth: float,
+              ) -> tuple[float, float]:
+    """Middle and scale of Student's density of a further value, where those (n,) of a baseline have their own level.
+
+    Values are normal about a level with a variance, whose prior is normal-inverse-chi-square (Gelman et al., Bayesian
+    Data Analysis, 3rd ed., section 3.3); the density has worth + n degrees of freedom. own: mean and standard deviation
+    of the class, from level to level and about it together; level_worth, worth: numbers of flights that the class's
+    level and its variance count as.
+    """
+    class_mean, spread = own
+    values = np.minimum(values, class_mean + MOST_STANDARD_DEVIATIONS * spread)
+    n, total = len(values), level_worth + len(values)
+    mean = (level_worth * class_mean + values.sum()) / total
+    about_level = spread ** 2 * level_worth / (level_worth + 1.0)
+    off = float(values.mean()) - class_mean if n else 0.0
+    squares = float(((values - off - class_mean) ** 2).sum()) + level_worth * n / total * off ** 2
+    variance = (worth * about_level + squares) / (worth + n)
+    return float(mean), float(np.sqrt(variance * (1.0 + 1.0 / total)))
+
+
 def mean_and_deviation(values: Sequence[float] | np.ndarray) -> tuple[float, float]:
     """Mean and standard deviation (unbiased) of values."""
     return float(np.mean(values)), float(np.std(values, ddof=1))

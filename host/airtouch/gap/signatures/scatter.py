@@ -29,6 +29,8 @@ EXACT = 1e-9  #: variance, in units of the nominal scatter squared, that is adde
 QUANTILES = 1000  #: of Student's distribution, of which sums of rarities are made; chosen
 STEPS = 12  #: iterations of the compromise between nominal scatter and chance; chosen
 LEAST_SPREAD = 0.05  #: natural steps: scatter of a size at least; chosen
+#: names in `Scatter.passing` of how unsteady torque and lift are, of which each vehicle has its own level
+UNSTEADY = UNSTEADY_TORQUE, UNSTEADY_LIFT = "unsteady_torque", "unsteady_lift"
 FALSE_SHARE = 0.01  #: share of nominal flights in which a passing effect may be named, or the rate be news; chosen
 
 

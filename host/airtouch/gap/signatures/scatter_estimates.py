@@ -9,12 +9,15 @@ from scipy.special import poch
 
 from airtouch.gap.signatures.alike import ALIKE
 from airtouch.gap.signatures.candidates import is_random
-from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, standard_deviation, updated
-from airtouch.gap.signatures.scatter import LEAST_SPREAD, ApparentStrengths, Scatter, fourth_root, table
+from airtouch.gap.signatures.posterior import LEAST, mean_and_deviation, predicted, standard_deviation, updated
+from airtouch.gap.signatures.scatter import LEAST_SPREAD, UNSTEADY, ApparentStrengths, Scatter, fourth_root, table
 from airtouch.gap.signatures.signature import SIGNATURES
 
 LEAST_RECORDED = 0.02  #: scatter at least, in natural steps, in recorded flights, which chance at times explains wholly
 RECORDED_WORTH = 4.0  #: flights that a class of recorded ones counts as at most, beside the baseline's own; chosen
+#: flights that the level of how unsteady a class of recorded ones is counts as, beside the baseline's own; chosen: it
+#: predicts 89 nominal flights of the build part from their baselines, 1 and 4 hardly worse (host/docs/looks.md)
+LEVEL_WORTH = 2.0
 POOLED = 1.0  #: flights that the scatter of all an effect's parameters together counts as, for each of them; chosen
 LEAST_RATE_SPREAD = 0.3  #: standard deviation at least of a rate's fourth root, where classes are compared; chosen
 RATE_FREEDOM = 4.0  #: degrees of freedom of Student's density of that root: a flight or two may be odd; chosen
@@ -51,7 +54,10 @@ def scatter_of(baseline: Sequence[ApparentStrengths], recorded: bool = False, ve
     means = _updated_means(update)
     least = LEAST if simulated else LEAST_RECORDED
     rms = _updated_rms(update, means, math.sqrt(widening), least) | _of_hidden(update)
-    passing = _air_as_one({n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items()})
+    level_worth = worth if simulated else min(worth, LEVEL_WORTH)
+    sizes = {n: updated(r, _sizes(known, n), worth, r[1]) for n, r in own.passing.items() if n not in UNSTEADY}
+    levels = {n: predicted(own.passing[n], _sizes(known, n), level_worth, worth) for n in UNSTEADY if n in own.passing}
+    passing = _air_as_one(sizes) | levels
     rate = updated(own.rate, fourth_root([f.rate for f in known]), worth)
     return Scatter(_alike_as_one(rms), worth + len(known), rate, passing, middle=means, exact=simulated)
 

@@ -25,7 +25,7 @@ Seconds = tuple[tuple[float, float], ...]  #: from and to, s, of each stretch un
 def show_false_alarms(flights: Path, tracks: list[Track], store: Path | None) -> None:
     """Print how often the diagnosis names a wake in seconds of nominal flights, in which there is none.
 
-    store: file of results, which are taken from there and appended (`kept.complete`).
+    store: file of results, which are taken from there and appended (`result_store.complete`).
     """
     seconds_of: dict[Kind, list[Seconds]] = {}
     for t in (t for t in tracks if t.row.get("truth") == "downwash"):

@@ -14,8 +14,8 @@ from airtouch.gap.flights.flight import ready
 from airtouch.gap.nominal import calibrate
 from airtouch.gap.nominal.apparent import passing_sizes
 from airtouch.gap.passing.one_sided import DOWNWARD
-from airtouch.gap.passing.unsteadiness import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.sealed.intervals import auroc
+from airtouch.gap.signatures.scatter import UNSTEADY_LIFT, UNSTEADY_TORQUE
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.study import Study
 from airtouch.logs import read
