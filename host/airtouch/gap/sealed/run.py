@@ -135,7 +135,7 @@ def _place(answers: Path, name: str, without: tuple[str, ...]) -> Path:
 
 
 def study_in(folder: Path) -> Study:
-    """The study of a sealed set's own vehicle and nominal flights; its scatter is measured before processes share it."""
+    """The study of a sealed set's own vehicle and nominal flights; its scatter is measured before it is shared."""
     cal = [read(p) for p in sorted(folder.glob("cal_*.csv.gz"))]
     study = make.calibrated_study(load(folder / "vehicle.toml"), cal)
     return study if study.scatter is None else study.with_scatter(study.scatter)
