@@ -7,9 +7,10 @@ import pytest
 
 from airtouch.gap.evidence.clock import loss
 from airtouch.gap.evidence.data import Data
+from airtouch.gap.evidence.fit import FittedTerms
 from airtouch.gap.evidence.problem import TWO_FOLDS
 from airtouch.gap.naming import judging
-from airtouch.gap.naming.judging import PricedVariant, covariance_among_all
+from airtouch.gap.naming.judging import PricedVariant, covariance_among_all, strength_of
 from airtouch.gap.naming.records import Hypothesis
 from airtouch.gap.signals.spectra import AIR
 from airtouch.gap.signatures.candidates import all_candidates, terms
@@ -105,3 +106,14 @@ def test_a_random_effect_that_is_not_there_costs_one_of_the_commands_nothing(stu
     both = judging.cross_validated(on, vibration, chosen)
     assert both.gain == pytest.approx(chosen.gain, abs=2.0)
     assert both.charges.uncertain_floor_loss == pytest.approx(certain - uncertain)
+
+
+def test_a_drag_beside_a_wind_has_its_own_strength():
+    """The wind's companion is a drag too, and stands before it."""
+    (drag,) = terms("rotor_drag")[:1]
+    companion, own = (replace(drag, companion=is_companion).fitted(np.full(len(drag.free), x))
+                      for is_companion, x in ((True, 3.0), (False, 6.0)))
+    both = (companion, own)
+    fits = [FittedTerms(both, np.concatenate([t.scaled(t.values) for t in both]), np.eye(2 * len(drag.free)))] * 2
+    for term, x in ((own, 6.0), (companion, 3.0)):
+        np.testing.assert_allclose(strength_of(term, both, fits).mean, x)
