@@ -44,8 +44,9 @@ HOPELESS = 0.5
 #: nats that a variant's mean term may be behind the best in screening and still be fitted with its random part; chosen:
 #: odds of 20, as between candidates (`answer.ranking.LEAST_DIFFERENCE`)
 ABOUT_AS_GOOD = 3.0
-#: nats that a hypothesis must gain in screening to be fitted in full; chosen for time: less means more fits, more loses
-#: effects that screening takes for weaker than they are
+#: nats that a hypothesis must gain in screening to be fitted in full, and the parameters of an effect of the loop
+#: together by a brief fit for each to be fitted alone; chosen for time: less means more fits, more loses effects that
+#: screening takes for weaker than they are
 PROMISING = 0.5 * FIRST_GAIN
 #: share of what it must gain, less PROMISING, that an effect of the loop must gain by a brief fit to be fitted in full;
 #: chosen for time: in 113 such fits of seven recorded flights the full one gained at most 1.25 times as much and 6 nats
