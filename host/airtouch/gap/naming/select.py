@@ -31,6 +31,7 @@ from airtouch.gap.naming.thresholds import assumes
 from airtouch.gap.naming.unknown import is_explained
 from airtouch.gap.passing.gates import PassingEffect
 from airtouch.gap.relations.inference import Inference
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.candidates import random_of
 from airtouch.gap.signatures.signature import OVERHEAD
 from airtouch.gap.signatures.term import Terms
@@ -125,8 +126,8 @@ def _by_replay(search: Search, partial: PartialSelection, unusual: Sequence[Pass
     """The selection that a search ended in, with what it leaves. unusual: `unusual_passing_effects`."""
     trial, policy, steps = search.trial, search.trial.policy, partial.steps
     last = steps[-1].terms if steps else ()
-    over_none = nameless_nats(trial, None)
-    over_last_step = nameless_nats(trial, steps[-1]) if steps else over_none
+    over_none, *over_steps = map_on_two_cores(lambda base: nameless_nats(trial, base), (None, *steps[-1:]))
+    over_last_step = over_steps[0] if steps else over_none
     selection = Selection(
         single_effects=partial.single_effects, steps=steps, halves=trial.halves, least_nats=partial.least_nats,
         nameless=NamelessGain(over_none, over_last_step, unexplained_outside(trial.data, last)),

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from airtouch.gap.naming.judging import PricedVariant, Trial, covariance_among_a
 from airtouch.gap.naming.policy import ABOUT_AS_GOOD, HOPELESS
 from airtouch.gap.naming.records import Charges, Hypothesis, Strength
 from airtouch.gap.naming.screening.first_order import judge_means, judge_random, shows
+from airtouch.gap.second_process import map_on_two_cores
 from airtouch.gap.signatures.alike import interchangeable
 from airtouch.gap.signatures.candidates import random_of, strength_term
 from airtouch.gap.signatures.signature import MEAN
@@ -83,18 +85,16 @@ def screen_variants(start: RoundStart, candidates: Mapping[str, Sequence[Terms]]
 
     candidates: variants by name; progress: called with every name.
     """
-    screened = Screened()
+    screened, means = Screened(), []
     for name, variants in candidates.items():
         progress(name)
         for variant in addable(name, variants, start.terms):
-            if random_of(variant.terms):
-                screened.random.append(variant)
-                continue
-            judged = _screened_means(start, variant)
-            if judged is None:
-                screened.fit_only.append(variant)
-            else:
-                screened.means.append(judged)
+            (screened.random if random_of(variant.terms) else means).append(variant)
+    for variant, judged in zip(means, map_on_two_cores(partial(_screened_means, start), means), strict=True):
+        if judged is None:
+            screened.fit_only.append(variant)
+        else:
+            screened.means.append(judged)
     return screened
 
 
