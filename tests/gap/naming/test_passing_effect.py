@@ -1,6 +1,7 @@
 """Passing effects, in made flights with a push for some seconds: when one is named, and before what."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from scipy.stats import t as student
@@ -9,6 +10,8 @@ from airtouch.gap.evidence.data import Data
 from airtouch.gap.evidence.judge import judge
 from airtouch.gap.evidence.problem import whole_of
 from airtouch.gap.naming import policy
+from airtouch.gap.naming.passing_effect import outgained
+from airtouch.gap.naming.records import Hypothesis, OutgainedPassing
 from airtouch.gap.passing.gates import KNOWN_OVERHEAD, passing_effects
 from airtouch.gap.signatures.scatter import FALSE_SHARE, size_of
 from hovers import ALWAYS, FLOOR, scattered, select_from, with_a_push
@@ -58,6 +61,19 @@ def test_passing_effect_must_gain_more_than_a_steady_one(names, nominal_sizes, m
     assert outgained.get("downwash") == (("mass", selection.single_effects["mass"].gain) if named == ["mass"] else None)
     for name, passing in selection.outgained.items():
         assert passing.gain == passing_effects(data)[name].gain < passing.steady_gain + policy.LEAST_GAIN
+
+
+@pytest.mark.parametrize(("name", "counts"), [("wind", True), ("downwash", False)])
+def test_passing_air_must_gain_more_than_the_same_air_all_along(name, counts):
+    """A steady push that nominal flights have as well: it does not count beside a wake."""
+    passing = SimpleNamespace(name=name, key=name, gain=100.0)
+    steady = {n: Hypothesis(n, (), gain, evidence=evidence)
+              for n, gain, evidence in (("wind", 90.0, 0.0), ("downwash", 90.0, 0.0), ("mass", 50.0, 20.0))}
+    search = SimpleNamespace(single_effects=steady, least_nats=dict.fromkeys(steady, policy.LEAST_GAIN))
+    found = outgained(search, [passing])
+    assert found == ({name: OutgainedPassing(100.0, name, 90.0)} if counts else {})
+    passing.gain = 90.0 + policy.LEAST_GAIN
+    assert outgained(search, [passing]) == {}
 
 
 @pytest.mark.parametrize(("less", "named"), [(policy.LEAST_GAIN - 1.0, []), (policy.LEAST_GAIN + 1.0, ["downwash"])])

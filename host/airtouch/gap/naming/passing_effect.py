@@ -33,13 +33,10 @@ def unusual_passing_effects(search: Search, without: Sequence[str]) -> list[Pass
 def passing_effect(search: Search, unusual: Sequence[PassingEffect]) -> Hypothesis | None:
     """The passing effect that explains most, as a hypothesis; None where none gains enough.
 
-    It must gain PASSING_GAIN more than every effect that always acts and has enough evidence. Seconds in which another
-    vehicle is known to be overhead go before others, which are only likely. unusual: `unusual_passing_effects`.
+    It must gain PASSING_GAIN more than what always acts (`_best_steady`). Seconds in which another vehicle is known to
+    be overhead go before others, which are only likely. unusual: `unusual_passing_effects`.
     """
-    if not unusual:  # what always acts need not be judged
-        return None
-    steady = _best_steady(search)
-    effects = [e for e in unusual if e.gain >= (steady.gain if steady else 0.0) + PASSING_GAIN]
+    effects = [e for e in unusual if not _is_outgained(search, e)]
     if not effects:
         return None
     overhead = [e for e in effects if e.key == KNOWN_OVERHEAD]
@@ -51,17 +48,27 @@ def outgained(search: Search, unusual: Sequence[PassingEffect]) -> dict[str, Out
 
     unusual: `unusual_passing_effects`.
     """
-    steady = _best_steady(search) if unusual else None
-    if steady is None:
-        return {}
-    return {e.name: OutgainedPassing(e.gain, steady.name, steady.gain)
-            for e in sorted(unusual, key=lambda e: e.gain) if e.gain < steady.gain + PASSING_GAIN}
+    steady = {e.name: _best_steady(search, e.name) for e in unusual}
+    return {e.name: OutgainedPassing(e.gain, best.name, best.gain) for e in sorted(unusual, key=lambda e: e.gain)
+            if (best := steady[e.name]) is not None and _is_outgained(search, e)}
 
 
-def _best_steady(search: Search) -> Hypothesis | None:
-    """The effect that gains most of those that always act and have enough evidence; None where there is none."""
-    sufficient = [h for name, h in search.single_effects.items() if h.evidence >= search.least_nats[name]]
-    return max(sufficient, key=lambda h: h.gain, default=None)
+def _is_outgained(search: Search, effect: PassingEffect) -> bool:
+    """Whether a passing effect gains less than PASSING_GAIN more than what always acts."""
+    steady = _best_steady(search, effect.name)
+    return effect.gain < (steady.gain if steady else 0.0) + PASSING_GAIN
+
+
+def _best_steady(search: Search, passing_name: str) -> Hypothesis | None:
+    """The effect that gains most of those that always act and have enough evidence; None where there is none.
+
+    The passing effect that they are compared with, `passing_name`, counts among them if it acts all along, whatever its
+    evidence: the trims of nominal flights differ as by a wind, and a wind that gains little by its seconds is no news.
+    A wake does not count, as no nominal flight is under another vehicle.
+    """
+    own = passing_name if passing_name != OVERHEAD else ""
+    counting = [h for name, h in search.single_effects.items() if name == own or h.evidence >= search.least_nats[name]]
+    return max(counting, key=lambda h: h.gain, default=None)
 
 
 def _hypothesis_of(trial: Trial, effect: PassingEffect) -> Hypothesis:
