@@ -59,7 +59,7 @@ REFUSED = [
     ("diagnosis/gap_training.py", "--seeds 0", LESS),
     ("diagnosis/gap_wakes.py", NONE, "has no manifest.csv"),
     ("diagnosis/gap_wakes.py", "--keep a", "--keep is of --false-alarms"),
-    ("diagnosis/gap_wakes.py", "--false-alarms --answers a", "leave them out"),
+    ("diagnosis/gap_wakes.py", "--false-alarms --answers a", "leave it out"),
     ("firmware/firmware_sizes.py", NONE, "no checkout of bitcraze/crazyflie-firmware"),
     ("firmware/stack.py", f"{NONE} appMain", "no appMain in any .ci file"),
     ("fuzz.py", "no-such", "no target no-such"),
