@@ -111,11 +111,11 @@ def summary(results: Sequence[PeerResult]) -> str:
 
 def _parameters(right: Sequence[PeerResult]) -> str:
     """A line on the parameters of right answers, as of a sealed set: median error, share within 90 % intervals."""
-    if not right:
+    scored = [(r, off) for r in right if (off := relative_error(r.truth, r.drawn, r.known)) is not None]
+    if not scored:
         return ""
-    errors = [relative_error(r.truth, r.drawn, r.known) for r in right]
-    within = [[q["low"] <= r.drawn[k] <= q["high"] for k, q in r.known.items()] for r in right]
-    error, held = median(np.array([e for e in errors if e is not None])), share_in_groups(within)
+    within = [[q["low"] <= r.drawn[k] <= q["high"] for k, q in r.known.items()] for r, _ in scored]
+    error, held = median(np.array([off for _, off in scored])), share_in_groups(within)
     return (f"\nparameters: median error {error['value']:.1%} [{error['low']:.1%}, {error['high']:.1%}] in "
             f"{error['n']} flights; in their 90 % interval {held['hits']} of {held['n']} [{held['low']:.0%}, "
             f"{held['high']:.0%}]")

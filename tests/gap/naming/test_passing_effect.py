@@ -70,8 +70,8 @@ def test_passing_air_must_gain_more_than_the_same_air_all_along(name, counts):
     steady = {n: Hypothesis(n, (), gain, evidence=evidence)
               for n, gain, evidence in (("wind", 90.0, 0.0), ("downwash", 90.0, 0.0), ("mass", 50.0, 20.0))}
     search = SimpleNamespace(single_effects=steady, least_nats=dict.fromkeys(steady, policy.LEAST_GAIN))
-    found = outgained(search, [passing])
-    assert found == ({name: OutgainedPassing(100.0, name, 90.0)} if counts else {})
+    beside_steady_air = {name: OutgainedPassing(100.0, name, 90.0)}
+    assert outgained(search, [passing]) == (beside_steady_air if counts else {})
     passing.gain = 90.0 + policy.LEAST_GAIN
     assert outgained(search, [passing]) == {}
 

@@ -36,7 +36,7 @@ def passing_effect(search: Search, unusual: Sequence[PassingEffect]) -> Hypothes
     It must gain PASSING_GAIN more than what always acts (`_best_steady`). Seconds in which another vehicle is known to
     be overhead go before others, which are only likely. unusual: `unusual_passing_effects`.
     """
-    effects = [e for e in unusual if not _is_outgained(search, e)]
+    effects = [e for e in unusual if not _is_outgained(e, _best_steady(search, e.name))]
     if not effects:
         return None
     overhead = [e for e in effects if e.key == KNOWN_OVERHEAD]
@@ -48,14 +48,13 @@ def outgained(search: Search, unusual: Sequence[PassingEffect]) -> dict[str, Out
 
     unusual: `unusual_passing_effects`.
     """
-    steady = {e.name: _best_steady(search, e.name) for e in unusual}
-    return {e.name: OutgainedPassing(e.gain, best.name, best.gain) for e in sorted(unusual, key=lambda e: e.gain)
-            if (best := steady[e.name]) is not None and _is_outgained(search, e)}
+    beside_steady = [(e, _best_steady(search, e.name)) for e in sorted(unusual, key=lambda e: e.gain)]
+    return {e.name: OutgainedPassing(e.gain, steady.name, steady.gain) for e, steady in beside_steady
+            if steady is not None and _is_outgained(e, steady)}
 
 
-def _is_outgained(search: Search, effect: PassingEffect) -> bool:
-    """Whether a passing effect gains less than PASSING_GAIN more than what always acts."""
-    steady = _best_steady(search, effect.name)
+def _is_outgained(effect: PassingEffect, steady: Hypothesis | None) -> bool:
+    """Whether a passing effect gains less than PASSING_GAIN more than the best that always acts; None for none."""
     return effect.gain < (steady.gain if steady else 0.0) + PASSING_GAIN
 
 

@@ -74,8 +74,8 @@ def calibrated(vehicle: Vehicle, flights: Sequence[Flight], *, scatter: bool = T
 
     Flights that cannot be nominal like the others (a touch of the ground, a swapped propeller) are left out and named,
     as long as most agree. scatter: the study says as well how strong every effect but those of `without` seems to be in
-    them. To measure it takes seconds a flight: that is done at once, but for simulated flights for which a library of
-    relations holds when it is first asked for.
+    them. To measure that takes seconds a flight. It is done at once; where a library of relations holds for simulated
+    flights, when it is first asked for.
     """
     alike, left_out = split_unlike(vehicle, flights, FAR)
     measured = _measured(vehicle, alike, scatter, without)
